@@ -1,0 +1,1 @@
+"""Equinox modules, one idea a file."""

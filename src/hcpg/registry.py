@@ -1,0 +1,93 @@
+"""File name -> plug-in; nothing is imported until it is asked for.
+
+`methods/sac_flow.py` is the method `sac_flow`; `tasks/metaworld/drawer_open.py` is the task
+`metaworld/drawer-open`. A suite may add a `generic.py` beside its tasks, with the tasks that need no file
+of their own (`FAMILY`) and those it refuses, each with the reason (`REFUSED`).
+"""
+
+import difflib
+import importlib
+import pkgutil
+from types import ModuleType
+
+from hcpg.interfaces import Suite, Task
+
+
+class UnknownNameError(LookupError):
+    """A name that no plug-in has; the message lists those there are."""
+
+    def __init__(self, kind: str, name: str, known: list[str]) -> None:
+        near = difflib.get_close_matches(name, known, n=1)
+        guess = f" Did you mean {near[0]!r}?" if near else ""
+        super().__init__(f"no {kind} is named {name!r}.{guess} Known: {', '.join(known)}.")
+
+    def __str__(self) -> str:
+        """The message as written, without the quotes that a LookupError would add."""
+        return str(self.args[0])
+
+
+class RefusedTaskError(LookupError):
+    """A task that exists in its suite and that no adapter fits; the message says why."""
+
+
+def names(kind: str) -> list[str]:
+    """The plug-ins of one kind (`methods`, `suites`, `tasks`) that have a file, by name."""
+    package = importlib.import_module(f"hcpg.{kind}")
+    found = pkgutil.walk_packages(package.__path__, f"hcpg.{kind}.")
+    modules = [info.name.removeprefix(f"hcpg.{kind}.") for info in found if not info.ispkg]
+    separate = kind == "tasks"
+    named = [name.replace(".", "/").replace("_", "-") if separate else name for name in modules]
+    return sorted(name for name in named if not name.endswith("/generic"))
+
+
+def method(name: str) -> ModuleType:
+    """The method's module: its `Config` and its class, `METHOD`."""
+    return _load("methods", name)
+
+
+def suite(name: str) -> Suite:
+    """The suite of that name; its simulator is imported only when an environment is made."""
+    return _load("suites", name).SUITE
+
+
+def task(name: str) -> Task:
+    """The task `suite/name`, from its own file or from its suite's generic family.
+
+    Raises:
+        UnknownNameError: no file and no family has the name.
+        RefusedTaskError: the suite has the task, but no adapter fits it.
+    """
+    if name in names("tasks"):
+        module = name.replace("/", ".").replace("-", "_")
+        return importlib.import_module(f"hcpg.tasks.{module}").TASK
+    family = _family(name.partition("/")[0])
+    short = name.partition("/")[2]
+    if family is not None and short in family.REFUSED:
+        raise RefusedTaskError(f"task {name!r} is refused: {family.REFUSED[short]}")
+    if family is not None and short in family.FAMILY:
+        return family.FAMILY[short]
+    raise UnknownNameError("task", name, task_names())
+
+
+def task_names() -> list[str]:
+    """Every task that can be trained, those of the generic families too."""
+    known = names("tasks")
+    for suite_name in names("suites"):
+        family = _family(suite_name)
+        known += [f"{suite_name}/{short}" for short in (family.FAMILY if family else ())]
+    return sorted(set(known))
+
+
+def _family(suite_name: str) -> ModuleType | None:
+    if suite_name not in names("suites"):
+        return None
+    package = importlib.import_module(f"hcpg.tasks.{suite_name}")
+    has_family = any(info.name == "generic" for info in pkgutil.iter_modules(package.__path__))
+    return importlib.import_module(f"{package.__name__}.generic") if has_family else None
+
+
+def _load(kind: str, name: str) -> ModuleType:
+    known = names(kind)
+    if name not in known:
+        raise UnknownNameError(kind.removesuffix("s"), name, known)
+    return importlib.import_module(f"hcpg.{kind}.{name}")

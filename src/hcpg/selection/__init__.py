@@ -1,0 +1,1 @@
+"""What to execute out of K proposals, from geometry alone; runs with NumPy alone."""

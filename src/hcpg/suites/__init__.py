@@ -1,0 +1,1 @@
+"""One simulator a file."""
