@@ -1,0 +1,98 @@
+"""From observations to executed actions: propose, see the scene, select. One jitted call."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+from jax import numpy as jnp
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from hcpg.interfaces import Method, ReadScene
+from hcpg.loops.runs_axis import axes_of, over_runs
+from hcpg.selection import Diagnostics, Selector, select
+
+
+class Chosen(NamedTuple):
+    """What to execute, and what the selector did, by name; nothing where none chose."""
+
+    actions: Float[Array, "*runs E A"]
+    seen: dict[str, Float[Array, "*runs"]]
+
+
+def guided(method: Method, selector: Selector, read_scene: ReadScene) -> Callable[..., Chosen]:
+    """A policy of the proposals: (state, observations [E, O], actor key, selector key) -> Chosen [E].
+
+    Source: paper, algorithm 1, lines 1 to 7.
+    """
+
+    def one(state: Any, observation: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> tuple:
+        proposals = method.propose(state, observation, key, selector.candidates)
+        extra = {}
+        if selector.needs_noise:
+            extra["noise"] = jax.random.uniform(luck, (selector.candidates,))
+        if selector.needs_values:
+            extra["values"] = method.value(state, observation, proposals)
+        return select(proposals, read_scene(observation), selector, **extra)
+
+    def every(state: Any, observations: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> Chosen:
+        actions, diagnostics = _per_environment(one)(state, observations, key, luck)
+        return Chosen(actions, _summary(diagnostics))
+
+    return every
+
+
+def bare(method: Method) -> Callable[..., Chosen]:
+    """The method's own evaluation action; no selector. Same signature as `guided`."""
+
+    def one(state: Any, observation: Array, key: PRNGKeyArray, _: PRNGKeyArray) -> Array:
+        return method.act(state, observation, key)
+
+    def every(state: Any, observations: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> Chosen:
+        return Chosen(_per_environment(one)(state, observations, key, luck), {})
+
+    return every
+
+
+def compiled(policy: Callable[..., Chosen], state_type: type, runs: int) -> Callable[..., Chosen]:
+    """The policy for R runs: (states, observations [R, E, O], actor keys [R], selector keys [R], tick).
+
+    `tick` counts the policy's calls; it names the random numbers of this one.
+    """
+
+    def one_run(state: Any, observations: Array, key: Array, luck: Array, tick: Array) -> Chosen:
+        return policy(state, observations, jax.random.fold_in(key, tick), jax.random.fold_in(luck, tick))
+
+    return jax.jit(over_runs(one_run, runs, (axes_of(state_type), 0, 0, 0, None)))
+
+
+def warmup(runs: int, environments: int, action_size: int) -> Callable[..., Chosen]:
+    """Uniform actions in [-1, 1] that bypass the selector: (keys [R], tick) -> Chosen."""
+
+    def one_run(key: Array, tick: Array) -> Chosen:
+        shape = (environments, action_size)
+        return Chosen(jax.random.uniform(jax.random.fold_in(key, tick), shape, minval=-1, maxval=1), {})
+
+    return jax.jit(over_runs(one_run, runs, (0, None)))
+
+
+def _summary(diagnostics: Diagnostics) -> dict[str, Float[Array, ""]]:
+    """What the selector did, averaged over a run's environments."""
+    effective = 1 / jnp.square(diagnostics.weights).sum(axis=-1)
+    shares = {
+        "selector_phase": diagnostics.phase,
+        "selector_effective_candidates": effective,
+        "selector_spread": diagnostics.spread,
+        "selector_blend_gap": diagnostics.blend_gap,
+    }
+    return {name: values.mean() for name, values in shares.items()}
+
+
+def _per_environment(one: Callable[..., Any]) -> Callable[..., Any]:
+    """`one`, written for one environment, for all of a run's; each has randomness of its own."""
+
+    def every(state: Any, observations: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> Any:
+        count = observations.shape[0]
+        keys, lucks = jax.random.split(key, count), jax.random.split(luck, count)
+        return jax.vmap(one, in_axes=(None, 0, 0, 0))(state, observations, keys, lucks)
+
+    return every

@@ -1,0 +1,92 @@
+"""The evaluation protocol: fixed start states, once with the selector and once bare."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+from hcpg.interfaces import Method, ReadScene
+from hcpg.loops import acting
+from hcpg.loops.episodes import Episodes
+from hcpg.loops.pool import Pool
+from hcpg.loops.streams import EVALUATION_SEED, Stream, key
+from hcpg.presets import Settings
+
+BARE = "bare"
+SIMULTANEOUS_EPISODES = 10
+"""Per run; more at once would save little time and cost memory (20 MB a simulator)."""
+
+
+class Evaluator:
+    """Evaluates R runs on one list of start states, the same for every run, method and time."""
+
+    def __init__(self, settings: Settings, method: Method, read_scene: ReadScene, seeds: list[int]) -> None:
+        self.episodes = settings.budget.evaluation_episodes
+        self.selector_name = settings.evaluation_selector.rule
+        self._settings, self._seeds = settings, seeds
+        self._policies = {
+            self.selector_name: acting.guided(method, settings.evaluation_selector, read_scene),
+            BARE: acting.bare(method),
+        }
+        self._compiled: dict[str, Callable[..., acting.Chosen]] = {}
+        self._pool: Pool | None = None
+        self._slots = min(self.episodes, SIMULTANEOUS_EPISODES)
+
+    def start_states(self) -> dict[str, Any]:
+        """The list of start states, for the manifest."""
+        return {"set_seed": EVALUATION_SEED, "starts": list(range(self.episodes))}
+
+    def evaluate(self, states: Any, step: int, workers: int) -> list[list[dict[str, Any]]]:
+        """For each run, a row per episode: all with the selector, then all bare."""
+        if self._pool is None:
+            seeds = [EVALUATION_SEED] * (self._slots * len(self._seeds))
+            self._pool = Pool(self._settings.task, seeds, workers=workers)
+        rows: list[list[dict[str, Any]]] = [[] for _ in self._seeds]
+        for name in self._policies:
+            for first in range(0, self.episodes, self._slots):
+                starts = np.arange(first, min(first + self._slots, self.episodes))
+                for run, records in enumerate(self._wave(name, states, step, starts)):
+                    facts = {"step": step, "phase": "evaluation", "selector": name}
+                    rows[run] += [{**facts, "adapter": self._settings.adapter, **each} for each in records]
+        return rows
+
+    def close(self) -> None:
+        """Stop the evaluation's simulators."""
+        if self._pool is not None:
+            self._pool.close()
+
+    def _wave(self, name: str, states: Any, step: int, starts: np.ndarray) -> list[list[dict[str, Any]]]:
+        """One episode from each start state, all runs side by side; records in order of the starts."""
+        pool, runs = self._pool, len(self._seeds)
+        assert pool is not None
+        policy = self._policy(name, states)
+        padded = np.resize(starts, self._slots)
+        every = np.tile(padded, runs)
+        observations, episodes = pool.reset(every), Episodes.begin(every)
+        keys, lucks = self._keys(step, int(starts[0]))
+        records: dict[int, dict[str, Any]] = {}
+        tick = 0
+        while len(records) < pool.size:
+            shaped = observations.reshape(runs, self._slots, -1)
+            actions = np.asarray(policy(states, shaped, keys, lucks, tick).actions)
+            pool.send(np.nan_to_num(actions.reshape(pool.size, -1)), every)
+            arrival = pool.receive()
+            episodes, ended = episodes.advance(arrival, every)
+            for record in ended:
+                records.setdefault(record["environment"], record)
+            observations, tick = arrival.observations, tick + 1
+        wanted = [range(run * self._slots, run * self._slots + len(starts)) for run in range(runs)]
+        return [[records[i] | {"environment": i - indices[0]} for i in indices] for indices in wanted]
+
+    def _policy(self, name: str, states: Any) -> Callable[..., acting.Chosen]:
+        if name not in self._compiled:
+            runs = len(self._seeds)
+            self._compiled[name] = acting.compiled(self._policies[name], type(states), runs)
+        return self._compiled[name]
+
+    def _keys(self, step: int, first: int) -> tuple[jax.Array, jax.Array]:
+        roots = [key(seed, Stream.EVALUATION) for seed in self._seeds]
+        at = [jax.random.fold_in(jax.random.fold_in(root, step), first) for root in roots]
+        both = jax.vmap(jax.random.split)(jax.numpy.stack(at))
+        return both[:, 0], both[:, 1]

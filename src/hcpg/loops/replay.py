@@ -1,0 +1,78 @@
+"""A ring of transitions per run, kept on the device and sampled inside the learner's scan."""
+
+from typing import NamedTuple
+
+import jax
+import numpy as np
+from jax import numpy as jnp
+from jaxtyping import Array, Int, PRNGKeyArray
+
+from hcpg.types import Batch, Spec
+
+
+class Replay(NamedTuple):
+    """The newest `capacity` transitions of each run; one insertion brings E of them per run."""
+
+    transitions: Batch
+    """Arrays [R, capacity, ...]."""
+    inserted: Int[Array, ""]
+    """Transitions ever inserted per run; the next goes to this index modulo the capacity."""
+
+
+def create(runs: int, capacity: int, spec: Spec) -> Replay:
+    """An empty ring."""
+    observations = jnp.zeros((runs, capacity, spec.observation_size))
+    actions = jnp.zeros((runs, capacity, spec.action_size))
+    numbers = jnp.zeros((runs, capacity))
+    transitions = Batch(observations, actions, numbers, jnp.copy(observations), jnp.copy(numbers))
+    return Replay(transitions, jnp.zeros((), jnp.int32))
+
+
+def insert(replay: Replay, arrivals: Batch) -> Replay:
+    """The ring with `arrivals` [R, E, ...] in place of the oldest E transitions of each run.
+
+    The capacity must be a multiple of E: an insertion never wraps around.
+    """
+    capacity, brought = replay.transitions.rewards.shape[1], arrivals.rewards.shape[1]
+    position = replay.inserted % capacity
+
+    def write(ring: Array, rows: Array) -> Array:
+        return jax.lax.dynamic_update_slice_in_dim(ring, rows, position, axis=1)
+
+    transitions = jax.tree.map(write, replay.transitions, arrivals)
+    return Replay(transitions, replay.inserted + brought)
+
+
+def sample(transitions: Batch, inserted: Int[Array, ""], key: PRNGKeyArray, batch_size: int) -> Batch:
+    """`batch_size` transitions of one run, uniform with replacement over what is filled."""
+    filled = jnp.minimum(inserted, transitions.rewards.shape[0])
+    rows = jax.random.randint(key, (batch_size,), 0, filled)
+    return jax.tree.map(lambda ring: ring[rows], transitions)
+
+
+def filled_part(replay: Replay, run: int) -> dict[str, np.ndarray]:
+    """One run's transitions as NumPy arrays, in ring order, without the part never written."""
+    filled = min(int(replay.inserted), replay.transitions.rewards.shape[1])
+    rings = replay.transitions._asdict()
+    return {name: np.asarray(ring[run, :filled]) for name, ring in rings.items()}
+
+
+def refill(replay: Replay, parts: list[dict[str, np.ndarray]], inserted: int) -> Replay:
+    """The ring as it was when `filled_part` read each run's share."""
+    rings = {
+        name: ring.at[:, : len(parts[0][name])].set(np.stack([part[name] for part in parts]))
+        for name, ring in replay.transitions._asdict().items()
+    }
+    return Replay(Batch(**rings), jnp.asarray(inserted, jnp.int32))
+
+
+def last_actions(part: dict[str, np.ndarray], inserted: int, environments: int, ages: np.ndarray) -> list:
+    """Each environment's actions since its episode began, `ages[e]` of them, oldest first.
+
+    `part` comes from `filled_part`; insertions were E rows each, one per environment.
+    """
+    actions = part["actions"]
+    newest = inserted // environments
+    steps = [np.arange(newest - age, newest) for age in ages]
+    rows = [(each * environments + index) % len(actions) for index, each in enumerate(steps)]
+    return [actions[each] for each in rows]

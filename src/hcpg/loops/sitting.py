@@ -1,0 +1,80 @@
+"""One sitting: start or take up runs in this process, train until the end or a stop, say how it ended."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+
+from hcpg import presets
+from hcpg.loops.journal import Journal, Notify
+from hcpg.loops.manifest import collect
+from hcpg.loops.runs import RunFolder
+from hcpg.loops.saving import Saver, restore
+from hcpg.loops.training import Trainer
+from hcpg.presets import Settings
+
+EXTENDABLE = ("budget.steps", "budget.evaluations")
+
+
+def create_folders(settings: Settings, seeds: list[int], root: Path) -> list[RunFolder]:
+    """A new run folder for every seed."""
+    budget = settings.budget
+    manifest = collect(
+        effective_batch=budget.batch_size,
+        update_ratio=budget.updates_per_step,
+        evaluation_starts=range(budget.evaluation_episodes),
+        training_selector=asdict(settings.selector),
+        evaluation_selector=asdict(settings.evaluation_selector),
+    )
+    address = {"task": settings.task, "preset": settings.preset, "manifest": manifest}
+    config = settings.as_json()
+    return [RunFolder.create(root, seed=seed, config=config, **address) for seed in seeds]
+
+
+def seed_of(folder: RunFolder) -> int:
+    """The seed a run was made with."""
+    return int(folder.manifest()["run"]["seed"])
+
+
+def extended(folder: RunFolder, steps: int | None) -> Settings:
+    """A run's own settings, with another number of steps if one is given."""
+    config = folder.config()
+    if steps is not None:
+        config["budget"]["steps"] = steps
+    return presets.from_json(config)
+
+
+def sit(
+    settings: Settings, folders: list[RunFolder], workers: int, notify: Notify, stop: Callable[[], bool]
+) -> list[bool]:
+    """Train the runs in `folders` together, from their checkpoints where they have any.
+
+    Gives for each run whether it is sound (it did not diverge).
+
+    Raises:
+        RunFolderError: a folder is in use, or was made under other settings.
+        WorkerError: an environment failed; the runs' state is saved.
+    """
+    seeds = [seed_of(folder) for folder in folders]
+    with ExitStack() as stack:
+        for folder in folders:
+            folder.check_config(settings.as_json(), EXTENDABLE)
+            stack.enter_context(folder.lock())
+        facts = {"selector": settings.selector.rule, "adapter": settings.adapter}
+        journal = Journal(folders, seeds, facts, notify)
+        trainer = Trainer(settings, seeds, journal, workers)
+        pool = stack.enter_context(trainer.pool())
+        try:
+            resumes = any(any(folder.checkpoints.glob("step_*")) for folder in folders)
+            position = restore(trainer, folders, pool) if resumes else trainer.fresh(pool)
+            for folder in folders:
+                folder.set_config(settings.as_json())
+                folder.set_status("running", step=trainer.step(position))
+            position = trainer.train(pool, position, Saver(trainer, folders), stop)
+        except Exception as error:
+            for folder in folders:
+                folder.set_status("failed", error=f"{type(error).__name__}: {error}")
+            raise
+        done = position.tick >= trainer.schedule.ticks()
+        journal.ended("finished" if done else "stopped", trainer.step(position))
+        return journal.alive

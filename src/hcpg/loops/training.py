@@ -1,0 +1,190 @@
+"""Train R runs of one configuration together: collect while learning, evaluate, save."""
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jax import numpy as jnp
+
+from hcpg import registry
+from hcpg.loops import acting, learning, replay, streams
+from hcpg.loops.episodes import Episodes
+from hcpg.loops.evaluation import Evaluator
+from hcpg.loops.journal import Journal
+from hcpg.loops.pool import Arrival, Pool
+from hcpg.loops.runs_axis import stack, take
+from hcpg.loops.schedule import Schedule
+from hcpg.loops.streams import Stream
+from hcpg.presets import Settings
+from hcpg.types import Batch
+
+
+class Position(NamedTuple):
+    """Where a population is: all that changes while it trains."""
+
+    tick: int
+    """Steps made by each environment."""
+    states: Any
+    """The method's states, with the run axis."""
+    replay: replay.Replay
+    episodes: Episodes
+    observations: np.ndarray
+    """[R * E, O], what to act on next."""
+    wall_s: float
+    """Time spent so far, earlier sittings included."""
+
+
+class Trainer:
+    """R runs (seeds) of one configuration on one pool of environments."""
+
+    def __init__(self, settings: Settings, seeds: list[int], journal: Journal, workers: int) -> None:
+        """Compile nothing and move nothing yet.
+
+        Raises:
+            BudgetError: the budget cannot be carried out.
+            UnknownNameError: the task, method or adapter does not exist.
+        """
+        task = registry.task(settings.task)
+        self.settings, self.seeds, self.journal, self.workers = settings, seeds, journal, workers
+        self.spec = registry.suite(task.suite).spec(task)
+        self.schedule = Schedule.of(settings.budget, task.horizon)
+        self.method = registry.method(settings.method).METHOD(settings.learner, self.spec)
+        if settings.adapter not in task.adapters:
+            raise registry.UnknownNameError("adapter", settings.adapter, sorted(task.adapters))
+        read_scene = task.adapters[settings.adapter]
+        self.evaluator = Evaluator(settings, self.method, read_scene, seeds)
+        self._keys = {each: jnp.stack([streams.key(seed, each) for seed in seeds]) for each in Stream}
+        self._initial = stack([self.method.init(key) for key in self._keys[Stream.NETWORKS]])
+        self._compile(read_scene)
+
+    def _compile(self, read_scene: Any) -> None:
+        runs, budget, state_type = len(self.seeds), self.settings.budget, type(self._initial)
+        policy = acting.guided(self.method, self.settings.selector, read_scene)
+        self._act = acting.compiled(policy, state_type, runs)
+        self._warm = acting.warmup(runs, budget.environments, self.spec.action_size)
+        updates = self.schedule.updates_per_tick
+        self._learn = learning.compiled(self.method, state_type, runs, updates, budget.batch_size)
+        self._insert = jax.jit(replay.insert, donate_argnums=0)
+
+    def pool(self) -> Pool:
+        """The training environments: E of each run, with the run's own start states."""
+        seeds = np.repeat(self.seeds, self.settings.budget.environments)
+        return Pool(self.settings.task, seeds.tolist(), workers=self.workers)
+
+    def empty(self) -> tuple[Any, replay.Replay]:
+        """Fresh states and an empty replay, which also serve as templates for a checkpoint."""
+        capacity = self.settings.budget.replay_capacity
+        return self._initial, replay.create(len(self.seeds), capacity, self.spec)
+
+    def fresh(self, pool: Pool) -> Position:
+        """The position at step 0."""
+        states, memory = self.empty()
+        starts = self._starts(np.zeros(pool.size, np.int64))
+        return Position(0, states, memory, Episodes.begin(starts), pool.reset(starts), 0.0)
+
+    def train(
+        self, pool: Pool, position: Position, save: Callable[[Position], None], stop: Callable[[], bool]
+    ) -> Position:
+        """Go on from `position` to the end of the budget, or until `stop` says so or all runs diverged.
+
+        `save` is called after every evaluation and before this returns or raises, with the last whole
+        position: a failing environment loses nothing.
+        """
+        began = time.monotonic() - position.wall_s
+        self.journal.begin(self.step(position))
+        try:
+            while position.tick < self.schedule.ticks() and any(self.journal.alive) and not stop():
+                position = self._advance(pool, position)._replace(wall_s=time.monotonic() - began)
+                self._report(position, save)
+        finally:
+            self.evaluator.close()
+            save(position)
+        return position
+
+    def step(self, position: Position) -> int:
+        """Environment steps of one run so far."""
+        return position.tick * self.settings.budget.environments
+
+    def _report(self, position: Position, save: Callable[[Position], None]) -> None:
+        step = self.step(position)
+        if self.schedule.logs(position.tick):
+            self.journal.row(step, int(position.states.updates), position.wall_s)
+        if self.schedule.evaluates(position.tick):
+            self.journal.evaluation(step, self.evaluator.evaluate(position.states, step, self.workers))
+            save(position)
+
+    def _advance(self, pool: Pool, position: Position) -> Position:
+        """One tick: the environments step while the learner learns from what came before."""
+        actions = self._choose(position)
+        next_starts = self._starts(position.episodes.number + 1)
+        pool.send(actions, next_starts)
+        states, finite = self._improve(position)
+        arrival = pool.receive()
+        tick = position.tick + 1
+        self._note_divergence(tick, states, arrival, np.asarray(finite))
+        episodes, records = position.episodes.advance(arrival, next_starts)
+        self._note_episodes(tick, records)
+        brought = Batch(
+            position.observations,
+            actions,
+            arrival.rewards,
+            arrival.next_observations,
+            arrival.terminated.astype(np.float32),
+        )
+        memory = self._insert(position.replay, jax.tree.map(self._per_run, brought))
+        return Position(tick, states, memory, episodes, arrival.observations, position.wall_s)
+
+    def _choose(self, position: Position) -> np.ndarray:
+        """Actions [R * E, A]."""
+        if self.schedule.explores(position.tick):
+            chosen = self._warm(self._keys[Stream.WARMUP], position.tick)
+        else:
+            keys = self._keys[Stream.ACTOR], self._keys[Stream.SELECTOR]
+            observations = self._per_run(position.observations)
+            chosen = self._act(position.states, observations, *keys, position.tick)
+        self.journal.metrics(chosen.seen)
+        actions = np.array(chosen.actions, np.float32).reshape(-1, self.spec.action_size)
+        actions[~np.isfinite(actions).all(axis=1)] = 0.0  # a diverged run's; its simulators idle
+        return actions
+
+    def _improve(self, position: Position) -> tuple[Any, Any]:
+        """The states after this tick's updates, and for each run whether they are finite."""
+        if not self.schedule.learns(position.tick):
+            return position.states, np.ones(len(self.seeds), bool)
+        keys = self._keys[Stream.REPLAY], self._keys[Stream.LEARNING]
+        states, metrics, finite = self._learn(position.states, position.replay, *keys)
+        self.journal.metrics(metrics)
+        return states, finite
+
+    def _note_divergence(self, tick: int, states: Any, arrival: Arrival, finite: np.ndarray) -> None:
+        rewards = self._per_run(np.isfinite(arrival.rewards)).all(axis=1)
+        observations = self._per_run(np.isfinite(arrival.next_observations)).all(axis=(1, 2))
+        for run in np.flatnonzero(~(rewards & observations & finite) & np.asarray(self.journal.alive)):
+            if not rewards[run]:
+                quantity = "reward"
+            elif not observations[run]:
+                quantity = "observation"
+            else:
+                quantity = learning.first_bad_leaf(take(states, run))
+            self.journal.diverged(run, tick * self.settings.budget.environments, quantity)
+
+    def _note_episodes(self, tick: int, records: list[dict[str, Any]]) -> None:
+        environments = self.settings.budget.environments
+        for run in range(len(self.seeds)):
+            own = range(run * environments, (run + 1) * environments)
+            mine = [
+                record | {"environment": record["environment"] - own[0]}
+                for record in records
+                if record["environment"] in own
+            ]
+            self.journal.episodes(tick * environments, run, mine)
+
+    def _starts(self, numbers: np.ndarray) -> np.ndarray:
+        """The start state of every environment's episode with that number."""
+        per_run = zip(self.seeds, self._per_run(numbers), strict=True)
+        return np.concatenate([streams.start_states(seed, of) for seed, of in per_run])
+
+    def _per_run(self, rows: np.ndarray) -> np.ndarray:
+        return rows.reshape(len(self.seeds), self.settings.budget.environments, *rows.shape[1:])

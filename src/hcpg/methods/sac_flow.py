@@ -1,0 +1,182 @@
+"""SAC-Flow: maximum-entropy actor-critic whose actor is a flow."""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import jax
+import optax
+from jax import numpy as jnp
+from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
+
+from hcpg.interfaces import Metrics
+from hcpg.networks.critics import Critics, CriticState, CrossQ, Polyak, Target
+from hcpg.networks.flow import FlowActor, Noise
+from hcpg.networks.velocity import FieldMoments
+from hcpg.types import Batch, Spec
+
+
+@dataclass(frozen=True)
+class Config:
+    """Settings of SAC-Flow; the defaults are the official from-scratch recipe."""
+
+    critic: Literal["crossq", "polyak"] = "crossq"
+    """crossq: batch renorm, joint pass, no target network. polyak: LayerNorm, target networks."""
+    flow_steps: int = 4
+    """Euler steps from noise to action."""
+    actor_hidden_size: int = 512
+    """Width of the gate, the candidate and the deviation network."""
+    critic_hidden_size: int = 1024
+    """Width of the critics' two hidden layers."""
+    discount: float = 0.99
+    """Discount per environment step, in [0, 1]."""
+    actor_learning_rate: float = 3e-4
+    """Adam's step size for the actor."""
+    critic_learning_rate: float = 1e-3
+    """Adam's step size for the critics."""
+    temperature_learning_rate: float = 1e-3
+    """Adam's step size for the logarithm of the temperature."""
+    momentum: float = 0.5
+    """Adam's decay of the first moment (beta 1), for all three."""
+    policy_delay: int = 3
+    """Critic updates per update of actor and temperature."""
+    initial_temperature: float = 0.2
+    """Weight of the entropy at the start."""
+    target_entropy: float = 0.0
+    """Entropy of the path (not of the action) that the temperature steers to, nats."""
+    target_rate: float = 0.005
+    """Share of the online critics mixed into their targets at each update (polyak only)."""
+
+
+class State(NamedTuple):
+    """Everything that learning changes."""
+
+    actor: FlowActor
+    actor_moments: FieldMoments
+    critic: CriticState
+    log_temperature: Float[Array, ""]
+    actor_optimizer: PyTree
+    critic_optimizer: PyTree
+    temperature_optimizer: PyTree
+    updates: Int[Array, ""]
+
+
+@dataclass(frozen=True)
+class SACFlow:
+    """The paper's backbone, bound to its settings and to one task's sizes.
+
+    Source: paper, section III-A; recipe of SAC-Flow trained from scratch.
+    """
+
+    config: Config
+    spec: Spec
+
+    @property
+    def critics(self) -> Critics:
+        """The critic recipe of the settings."""
+        size, rate = self.config.critic_hidden_size, self.config.target_rate
+        return CrossQ(size) if self.config.critic == "crossq" else Polyak(size, target_rate=rate)
+
+    def init(self, key: PRNGKeyArray) -> State:
+        """Fresh networks and optimizers."""
+        config, sizes = self.config, (self.spec.observation_size, self.spec.action_size)
+        of_actor, of_critic = jax.random.split(key)
+        actor = FlowActor.create(of_actor, sizes, config.actor_hidden_size, config.flow_steps)
+        critic = self.critics.init(of_critic, sum(sizes))
+        log_temperature = jnp.log(jnp.asarray(config.initial_temperature))
+        return State(
+            actor,
+            actor.field.moments(),
+            critic,
+            log_temperature,
+            self._adam(config.actor_learning_rate).init(actor),
+            self._adam(config.critic_learning_rate).init(critic.networks),
+            self._adam(config.temperature_learning_rate).init(log_temperature),
+            jnp.zeros((), jnp.int32),
+        )
+
+    def propose(
+        self, state: State, observation: Float[Array, " O"], key: PRNGKeyArray, count: int
+    ) -> Float[Array, "K A"]:
+        """`count` independent samples of the noise-perturbed flow, in one pass."""
+        noise = Noise.draw(key, (count, self.spec.action_size), self.config.flow_steps)
+        return state.actor.infer(state.actor_moments, observation[None], noise).actions
+
+    def act(self, state: State, observation: Float[Array, " O"], key: PRNGKeyArray) -> Float[Array, " A"]:
+        """One sample: a flow policy has no deterministic action, so evaluation stays stochastic."""
+        return self.propose(state, observation, key, 1)[0]
+
+    def value(
+        self, state: State, observation: Float[Array, " O"], actions: Float[Array, "K A"]
+    ) -> Float[Array, " K"]:
+        """The smaller of the two critics' values."""
+        repeated = jnp.broadcast_to(observation, (actions.shape[0], observation.size))
+        inputs = jnp.concatenate([repeated, actions], axis=-1)
+        return self.critics.values(state.critic, inputs).min(axis=0)
+
+    def update(self, state: State, batch: Batch, key: PRNGKeyArray) -> tuple[State, Metrics]:
+        """Improve the critics; every `policy_delay`-th time the actor and the temperature too."""
+        of_target, of_actor = jax.random.split(key)
+        state, metrics = self._improve_critics(state, batch, of_target)
+        state = state._replace(updates=state.updates + 1)
+        due = state.updates % self.config.policy_delay == 0
+        state, of_policy = jax.lax.cond(
+            due,
+            lambda: self._improve_policy(state, batch, of_actor),
+            lambda: (state, dict.fromkeys(POLICY_METRICS, jnp.float32(jnp.nan))),
+        )
+        return state, {**metrics, **of_policy, "temperature": jnp.exp(state.log_temperature)}
+
+    def _improve_critics(
+        self, state: State, batch: Batch, key: PRNGKeyArray
+    ) -> tuple[State, dict[str, Array]]:
+        noise = Noise.draw(key, batch.actions.shape, self.config.flow_steps)
+        path = state.actor.infer(state.actor_moments, batch.next_observations, noise)
+        bonus = -jnp.exp(state.log_temperature) * path.log_prob
+        following = Target(path.actions, bonus, self.config.discount)
+        (loss, (critic, values)), gradient = jax.value_and_grad(self.critics.loss, has_aux=True)(
+            state.critic.networks, state.critic, batch, following
+        )
+        adam = self._adam(self.config.critic_learning_rate)
+        step, optimizer = adam.update(gradient, state.critic_optimizer)
+        critic = critic._replace(networks=optax.apply_updates(critic.networks, step))
+        state = state._replace(critic=self.critics.follow(critic), critic_optimizer=optimizer)
+        return state, {"critic_loss": loss, "value": values.mean()}
+
+    def _improve_policy(
+        self, state: State, batch: Batch, key: PRNGKeyArray
+    ) -> tuple[State, dict[str, Array]]:
+        noise = Noise.draw(key, batch.actions.shape, self.config.flow_steps)
+        (loss, (entropy, moments)), gradient = jax.value_and_grad(self._actor_loss, has_aux=True)(
+            state.actor, state, batch.observations, noise
+        )
+        adam = self._adam(self.config.actor_learning_rate)
+        step, actor_optimizer = adam.update(gradient, state.actor_optimizer)
+        surplus = entropy - self.config.target_entropy
+        slope = jnp.exp(state.log_temperature) * surplus
+        adam = self._adam(self.config.temperature_learning_rate)
+        temperature_step, temperature_optimizer = adam.update(slope, state.temperature_optimizer)
+        state = state._replace(
+            actor=optax.apply_updates(state.actor, step),
+            actor_moments=moments,
+            actor_optimizer=actor_optimizer,
+            log_temperature=state.log_temperature + temperature_step,
+            temperature_optimizer=temperature_optimizer,
+        )
+        norm = optax.global_norm(gradient)
+        return state, {"actor_loss": loss, "path_entropy": entropy, "actor_gradient": norm}
+
+    def _actor_loss(
+        self, actor: FlowActor, state: State, observations: Float[Array, "B O"], noise: Noise
+    ) -> tuple[Float[Array, ""], tuple[Float[Array, ""], FieldMoments]]:
+        path, moments = actor.train(state.actor_moments, observations, noise)
+        inputs = jnp.concatenate([observations, path.actions], axis=-1)
+        values = self.critics.values(state.critic, inputs).min(axis=0)
+        loss = (jnp.exp(state.log_temperature) * path.log_prob - values).mean()
+        return loss, (-path.log_prob.mean(), moments)
+
+    def _adam(self, learning_rate: float) -> optax.GradientTransformation:
+        return optax.adam(learning_rate, b1=self.config.momentum)
+
+
+POLICY_METRICS = ("actor_loss", "path_entropy", "actor_gradient")
+METHOD = SACFlow

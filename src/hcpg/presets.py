@@ -1,0 +1,145 @@
+"""The paper's method-and-selector pairs and the budgets, as values; and the settings of a run."""
+
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from hcpg import registry
+from hcpg.selection import Selector
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much data, learning and evaluation one run gets."""
+
+    name: str
+    """Name of the preset; every result carries it."""
+    steps: int
+    """Environment steps of one run, over all its environments."""
+    environments: int
+    """Environments of one run, stepped together."""
+    updates_per_step: float
+    """Critic updates per environment step."""
+    warmup_steps: int
+    """First environment steps, with uniform actions that bypass the selector."""
+    batch_size: int
+    """Transitions per update."""
+    evaluations: int
+    """Evaluations of one run, evenly spaced; the last one comes at the end."""
+    evaluation_episodes: int
+    """Episodes per evaluation, each run with the selector and bare; one start state each."""
+    replay_capacity: int = 1_000_000
+    """Transitions kept; the oldest are overwritten."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Everything that decides what a run computes, the seed apart."""
+
+    task: str
+    """Task as suite/name; `hcpg list` shows them."""
+    preset: str
+    """Name of the method-and-selector pair; the run folder and the plots carry it."""
+    method: str
+    """Learning method: a file under `hcpg/methods`."""
+    learner: Any
+    """The method's own settings."""
+    selector: Selector
+    """What chooses among the proposals while training data is collected."""
+    evaluation_selector: Selector
+    """What chooses among the proposals at evaluation; the bare actor is evaluated beside it."""
+    adapter: str
+    """Family of the task's scene reader: `paper` or `contact`; never mixed in one table."""
+    budget: Budget
+    """Data, learning and evaluation."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values for `config.json`, the same for equal settings."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A method and the selector it acts with."""
+
+    method: str
+    selector: Selector
+    overrides: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """The method's settings by budget name, where they differ from its defaults."""
+
+
+CPU_SAC_FLOW = {"actor_hidden_size": 256, "critic_hidden_size": 256}
+
+PRESETS = {
+    "hcpg_flow": Preset("sac_flow", Selector("hcpg", candidates=4), {"cpu": CPU_SAC_FLOW}),
+    "sac_flow": Preset("sac_flow", Selector("first", candidates=1), {"cpu": CPU_SAC_FLOW}),
+}
+
+BUDGETS = {
+    "paper": Budget(
+        "paper",
+        steps=1_000_000,
+        environments=1,
+        updates_per_step=1.0,
+        warmup_steps=50_000,
+        batch_size=512,
+        evaluations=25,
+        evaluation_episodes=50,
+    ),
+    "cpu": Budget(
+        "cpu",
+        steps=100_000,
+        environments=8,
+        updates_per_step=0.25,
+        warmup_steps=5_000,
+        batch_size=256,
+        evaluations=12,
+        evaluation_episodes=20,
+        replay_capacity=200_000,
+    ),
+}
+
+
+def settings(task: str, preset: str = "hcpg_flow", budget: str = "cpu") -> Settings:
+    """The full settings behind three names.
+
+    Raises:
+        UnknownNameError: the preset or the budget does not exist.
+    """
+    chosen = _known("preset", preset, PRESETS)
+    amount = _known("budget", budget, BUDGETS)
+    config = registry.method(chosen.method).Config()
+    return Settings(
+        task=task,
+        preset=preset,
+        method=chosen.method,
+        learner=replace(config, **chosen.overrides.get(budget, {})),
+        selector=chosen.selector,
+        evaluation_selector=chosen.selector,
+        adapter="paper",
+        budget=amount,
+    )
+
+
+def _known(kind: str, name: str, table: dict[str, Any]) -> Any:
+    if name not in table:
+        raise registry.UnknownNameError(kind, name, sorted(table))
+    return table[name]
+
+
+def from_json(config: dict[str, Any]) -> Settings:
+    """The settings that `Settings.as_json` wrote down."""
+    learner = registry.method(config["method"]).Config(**config["learner"])
+    return Settings(
+        **{
+            **config,
+            "learner": learner,
+            "selector": _selector(config["selector"]),
+            "evaluation_selector": _selector(config["evaluation_selector"]),
+            "budget": Budget(**config["budget"]),
+        }
+    )
+
+
+def _selector(fields: dict[str, Any]) -> Selector:
+    pairs = {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
+    return Selector(**pairs)
