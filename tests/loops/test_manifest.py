@@ -1,0 +1,83 @@
+"""The manifest says what an independent look at the machine and the checkout says."""
+
+import hashlib
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hcpg.loops.manifest import code, collect, hardware, versions
+
+
+def git(folder, *arguments):
+    identity = ["-c", "user.name=a", "-c", "user.email=a@b"]
+    command = ["git", "-C", folder, *identity, *arguments]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return done.stdout.strip()
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    (tmp_path / "requirements.lock").write_text("numpy==2.0\n")
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "-q", "-m", "one")
+    return tmp_path
+
+
+def test_collect_goes_through_json_unchanged(monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["hcpg", "train", "--task", "a b"])
+    manifest = collect(
+        effective_batch=256,
+        update_ratio=0.25,
+        evaluation_starts=range(3),
+        training_selector={"rule": "hcpg", "temperature": 0.7},
+        evaluation_selector={"rule": "first"},
+    )
+    assert json.loads(json.dumps(manifest, allow_nan=False)) == manifest
+    assert manifest["evaluation_starts"] == [0, 1, 2]
+    assert manifest["selectors"] == {
+        "training": {"rule": "hcpg", "temperature": 0.7},
+        "evaluation": {"rule": "first"},
+    }
+    assert (manifest["effective_batch"], manifest["update_ratio"]) == (256, 0.25)
+    assert manifest["guarantee"] == "bit-equal on CPU with the same versions"
+    assert manifest["command"] == "hcpg train --task 'a b'"
+
+
+def test_versions_are_the_imported_ones():
+    import jax
+    import optax
+
+    found = versions()
+    assert found["python"] == ".".join(map(str, sys.version_info[:3]))
+    assert (found["jax"], found["optax"], found["numpy"]) == (
+        jax.__version__,
+        optax.__version__,
+        np.__version__,
+    )
+
+
+def test_code_names_commit_changes_and_locks(checkout):
+    lock = {"requirements.lock": hashlib.sha256(b"numpy==2.0\n").hexdigest()}
+    commit = git(checkout, "rev-parse", "HEAD")
+    assert code(checkout) == {"commit": commit, "dirty": False, "locks": lock}
+    (checkout / "new.py").write_text("")
+    assert code(checkout) == {"commit": commit, "dirty": True, "locks": lock}
+
+
+def test_code_outside_a_checkout_has_no_commit(checkout):
+    inside = checkout / "site-packages"
+    inside.mkdir()
+    assert code(inside) == {"commit": None, "dirty": None, "locks": {}}
+
+
+def test_hardware_agrees_with_the_system():
+    found = hardware()
+    assert found["cores"] == int(subprocess.run(["nproc"], capture_output=True, text=True, check=True).stdout)
+    with open("/proc/meminfo") as file:
+        total_kib = int(file.readline().split()[1])
+    assert found["memory_gib"] == pytest.approx(total_kib / 2**20, abs=0.1)
+    assert found["accelerator"] is None

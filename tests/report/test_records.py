@@ -1,0 +1,68 @@
+"""Rows become curves: by step and selector, seeds side by side, nothing counted twice."""
+
+import numpy as np
+import pytest
+
+from hcpg.report.records import RecordError, find_runs, load_run, load_runs
+from hcpg.report.rows import append_rows
+
+
+def test_a_run_becomes_one_curve_per_selector(write_run):
+    record = load_run(write_run(preset="p", seed=2, success=[0, 4, 10], bare=[0, 1, 5]))
+    assert (record.task, record.preset, record.seed) == ("point/reach", "p", 2)
+    assert (record.adapter, record.selector) == ("paper", "hcpg")
+    assert record.curves["hcpg"].steps.tolist() == [100, 200, 300]
+    assert record.curves["hcpg"].rates.tolist() == [0.0, 0.4, 1.0]
+    assert record.curves["bare"].successes.tolist() == [0, 1, 5]
+    assert record.curves["bare"].episodes.tolist() == [10, 10, 10]
+    assert record.steps_per_s == 300.0
+    assert record.wall_s == 182.0
+
+
+def test_seeds_are_stacked_at_the_steps_they_share(tmp_path, write_run):
+    write_run(preset="p", seed=1, success=[0, 10], bare=[0, 0])
+    write_run(preset="p", seed=0, success=[5, 6, 7], bare=[1, 2, 3])
+    (group,) = load_runs([tmp_path])
+    curve = group.curve("hcpg")
+    assert curve is not None
+    assert [run.seed for run in group.runs] == [0, 1]
+    assert curve.steps.tolist() == [100, 200]
+    np.testing.assert_array_equal(curve.rates, [[0.5, 0.6], [0.0, 1.0]])
+    assert group.curve("first") is None
+
+
+def test_groups_are_tasks_and_presets(tmp_path, write_run):
+    for preset, selector in (("b", "first"), ("a", "hcpg")):
+        write_run(preset=preset, seed=0, selector=selector, success=[1], bare=[1])
+    write_run(preset="a", seed=0, success=[1], bare=[1], task="point/carry")
+    groups = load_runs([tmp_path / "point" / "reach", tmp_path])
+    assert [(group.task, group.preset, group.selector) for group in groups] == [
+        ("point/carry", "a", "hcpg"),
+        ("point/reach", "a", "hcpg"),
+        ("point/reach", "b", "first"),
+    ]
+
+
+def test_of_one_seed_the_newest_evaluated_run_counts(tmp_path, caplog, write_run):
+    write_run(preset="p", seed=0, success=[1], bare=[1], run_id="20260101T000000Z-a")
+    newer = write_run(preset="p", seed=0, success=[2], bare=[2], run_id="20260102T000000Z-a")
+    write_run(preset="p", seed=0, success=[], bare=[], run_id="20260103T000000Z-a")
+    write_run(preset="p", seed=0, success=[3], bare=[3], run_id=".making-20260104T000000Z-a")
+    (group,) = load_runs([tmp_path])
+    assert [run.path for run in group.runs] == [newer]
+    assert len(find_runs(tmp_path)) == 3
+    assert "20260103T000000Z-a: it has no evaluation yet" in caplog.text
+    assert "20260101T000000Z-a:" in caplog.text
+
+
+def test_what_would_make_a_dishonest_number_is_an_error(tmp_path, write_run, episode_rows):
+    with pytest.raises(RecordError, match="no evaluated run under"):
+        load_runs([tmp_path])
+    path = write_run(preset="p", seed=0, success=[1], bare=[1])
+    append_rows(path / "episodes.jsonl", episode_rows(100, "hcpg", 1, 1))
+    with pytest.raises(RecordError, match="at step 100 with selector hcpg counts start state 0 twice"):
+        load_run(path)
+    path = write_run(preset="p", seed=1, success=[1], bare=[1])
+    append_rows(path / "episodes.jsonl", episode_rows(200, "hcpg", 1, 1, adapter="contact"))
+    with pytest.raises(RecordError, match="mix the adapters contact, paper"):
+        load_run(path)
