@@ -76,7 +76,11 @@ def test_code_outside_a_checkout_has_no_commit(checkout):
 
 def test_hardware_agrees_with_the_system():
     found = hardware()
-    assert found["cores"] == int(subprocess.run(["nproc"], capture_output=True, text=True, check=True).stdout)
+    # An empty environment: nproc would obey OMP_NUM_THREADS.
+    usable = subprocess.run(["nproc"], capture_output=True, text=True, check=True, env={})
+    assert found["usable_cores"] == int(usable.stdout)
+    total = subprocess.run(["nproc", "--all"], capture_output=True, text=True, check=True, env={})
+    assert found["cores"] == int(total.stdout)
     with open("/proc/meminfo") as file:
         total_kib = int(file.readline().split()[1])
     assert found["memory_gib"] == pytest.approx(total_kib / 2**20, abs=0.1)

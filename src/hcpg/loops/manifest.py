@@ -74,12 +74,13 @@ def code(root: Path) -> dict[str, Any]:
 
 
 def hardware() -> dict[str, Any]:
-    """The processor's model, the cores this process may use, memory in GiB, and the accelerator."""
+    """The processor's model, its cores and those this process may use, memory in GiB, and the accelerator."""
     memory_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     devices = jax.devices()
     return {
         "cpu": _cpu_model(),
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": os.cpu_count(),
+        "usable_cores": len(os.sched_getaffinity(0)),
         "memory_gib": round(memory_bytes / 2**30, 1),
         "accelerator": None if devices[0].platform == "cpu" else devices[0].device_kind,
         "devices": len(devices),
