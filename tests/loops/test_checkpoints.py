@@ -14,7 +14,7 @@ import numpy as np
 import optax
 import pytest
 
-from hcpg.loops.checkpoints import CheckpointError, damage, latest, load, load_raw, save
+from hcpg.loops.checkpoints import CheckpointError, damage, latest, load, load_raw, save, step_of
 
 
 def tree_of(seed):
@@ -159,6 +159,8 @@ def test_the_newest_two_stay(tmp_path):
         save(tmp_path, step, {"state": {"step": np.array(step)}}, {})
     assert steps_in(tmp_path) == ["step_000000020", "step_000000030"]
     assert latest(tmp_path) == tmp_path / "step_000000030"
+    assert latest(tmp_path, not_after=29) == tmp_path / "step_000000020"
+    assert latest(tmp_path, not_after=19) is None
 
 
 def test_a_step_saved_again_is_replaced(tmp_path):
@@ -172,6 +174,7 @@ def test_a_kill_between_setting_aside_and_replacing_loses_nothing(tmp_path):
     path = save(tmp_path, 10, {}, {"value": 1})
     aside = path.rename(tmp_path / "step_000000010.replaced")
     assert latest(tmp_path) == aside
+    assert step_of(aside) == 10
     save(tmp_path, 10, {}, {"value": 2})
     assert steps_in(tmp_path) == ["step_000000010"]
 

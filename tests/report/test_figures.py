@@ -57,5 +57,5 @@ def test_what_cannot_be_drawn_is_said(groups, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="8 presets in one picture, at most 7"):
         learning_curves(many, tmp_path / "many")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(MissingExtraError, match=r"needs matplotlib.*pip install 'hcpg-flow\[report\]'"):
+    with pytest.raises(MissingExtraError, match=r"matplotlib is not .*pip install 'hcpg-flow\[plots\]'"):
         learning_curves(groups, tmp_path / "none")

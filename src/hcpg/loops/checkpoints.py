@@ -65,14 +65,21 @@ def save(
     return target
 
 
-def latest(folder: Path) -> Path | None:
+def latest(folder: Path, not_after: int | None = None) -> Path | None:
     """The newest checkpoint whose every byte is as written; None if none was ever completed.
+
+    Args:
+        folder: where the run's checkpoints lie.
+        not_after: a step; later checkpoints do not count. A kill may leave the runs of a population one
+            checkpoint apart: the newest step that all have is the smallest of their newest ones.
 
     Raises:
         CheckpointError: there are checkpoints, and all are damaged.
     """
     reasons = []
     for path in reversed(_published(folder)):
+        if not_after is not None and step_of(path) > not_after:
+            continue
         reason = damage(path)
         if reason is None:
             return path
@@ -84,6 +91,11 @@ def latest(folder: Path) -> Path | None:
             "Restore one from a copy, or start a new run."
         )
     return None
+
+
+def step_of(checkpoint: Path) -> int:
+    """The environment step a checkpoint was made at, from its name."""
+    return int(checkpoint.stem.removeprefix("step_"))
 
 
 def damage(path: Path, names: Iterable[str] | None = None) -> str | None:

@@ -7,13 +7,11 @@ class MissingExtraError(ModuleNotFoundError):
     """An optional package that is not installed; the message has the command that installs it."""
 
 
-def require(package: str, purpose: str) -> None:
-    """Make sure that `package` can be imported.
+def require(package: str, extra: str) -> None:
+    """Make sure that `package`, which the extra `extra` brings, can be imported.
 
     Raises:
         MissingExtraError: it is not installed.
     """
     if find_spec(package) is None:
-        raise MissingExtraError(
-            f"{purpose} needs {package}, which is not installed. Run: pip install 'hcpg-flow[report]'"
-        )
+        raise MissingExtraError(f"{package} is not installed. Run: pip install 'hcpg-flow[{extra}]'")

@@ -42,7 +42,7 @@ def learning_curves(groups: Sequence[Group], stem: Path) -> tuple[Path, Path]:
         MissingExtraError: matplotlib is not installed.
         ValueError: more presets than can be told apart.
     """
-    require("matplotlib", "a picture")
+    require("matplotlib", "plots")
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -19,7 +19,7 @@ def write_video(frames: Iterable[UInt8[np.ndarray, "H W 3"]], path: Path, fps: i
         MissingExtraError: imageio-ffmpeg is not installed.
         ValueError: no frames, or frames of different sizes.
     """
-    require("imageio_ffmpeg", "a video")
+    require("imageio_ffmpeg", "video")
     import imageio_ffmpeg
 
     frames = iter(frames)
