@@ -1,0 +1,61 @@
+"""How far a proposal moves in the direction that matters now.
+
+Every function takes any finite input, however extreme, without overflow.
+"""
+
+from hcpg.selection.arrays import bounded, length, namespace
+from hcpg.types import Float, Tensor
+
+
+def directional_progress(
+    translations: Float[Tensor, "*batch K 3"], target: Float[Tensor, "*batch 3"], epsilon: float
+) -> Float[Tensor, "*batch K"]:
+    """The part of each translation that points along `target`, in the translation's units.
+
+    For a small step it is the rate at which the distance to the target shrinks (equation 6).
+
+    Source: paper, equation (5).
+    """
+    xp = namespace(translations)
+    # Dividing by the largest component first, target / max(norm, epsilon) needs no large square.
+    unit = xp.maximum(xp.max(xp.abs(target), axis=-1, keepdims=True), epsilon)
+    scaled = target / unit
+    direction = scaled / xp.maximum(length(scaled), 1.0)[..., None]
+    return xp.sum(translations * direction[..., None, :], axis=-1)
+
+
+def contact_phase(
+    approach: Float[Tensor, "*batch 3"], contact: Float[Tensor, "*batch"] | None, gate_radius_m: float
+) -> Float[Tensor, "*batch"]:
+    """0 before contact, 1 after it; a contact flag goes before the distance, and may lie between.
+
+    Source: paper, equation (7).
+    """
+    xp = namespace(approach)
+    if contact is not None:
+        return xp.clip(contact, 0.0, 1.0)
+    # Far is far: shortening a long vector to twice the radius cannot bring it inside.
+    near = xp.clip(approach, -2 * gate_radius_m, 2 * gate_radius_m)
+    distance = length(near)
+    return xp.where(distance < gate_radius_m, xp.ones_like(distance), xp.zeros_like(distance))
+
+
+def score(
+    translations: Float[Tensor, "*batch K 3"],
+    approach: Float[Tensor, "*batch 3"],
+    task: Float[Tensor, "*batch 3"],
+    phase: Float[Tensor, "*batch"],
+    action_penalty: float,
+    epsilon: float,
+) -> Float[Tensor, "*batch K"]:
+    """Progress in the phase that holds, less a small price for large moves; in the translation's units.
+
+    A component beyond an eighth of the dtype's largest number (less with a large penalty) counts as that.
+
+    Source: paper, equation (8).
+    """
+    moves = bounded(translations, 8.0 * (1.0 + action_penalty))
+    after = phase[..., None]
+    before_contact = directional_progress(moves, approach, epsilon)
+    after_contact = directional_progress(moves, task, epsilon)
+    return (1.0 - after) * before_contact + after * after_contact - action_penalty * length(moves)
