@@ -6,6 +6,7 @@ threads), so a script that makes a pool needs the usual `if __name__ == "__main_
 
 import multiprocessing
 import os
+import select
 import signal
 import time
 from collections.abc import Iterator, Sequence
@@ -74,7 +75,7 @@ class Pool:
         sizes = Sizes(self.size, *self.spec, workers=min(workers, self.size))
         memory = SharedMemory(create=True, size=board_bytes(sizes))
         self._memory: SharedMemory | None = memory
-        self._board: Board = board_in(memory.buf, sizes)
+        self._board: Board = board_in(memory, sizes)
         self._board.busy[:] = NOBODY
         self._starts = np.full(self.size, -1)
         self._shares = np.array_split(np.arange(self.size), sizes.workers)
@@ -194,7 +195,7 @@ class Pool:
     def _answer(self, worker: int, deadline: float) -> Any:
         connection = self._crew.connections[worker]
         try:
-            if not connection.poll(max(0.0, deadline - time.monotonic())):
+            if not self._crew.pollers[worker].poll(max(0.0, deadline - time.monotonic()) * 1000):
                 self._crew.processes[worker].kill()
                 self._report(worker, f"gave no answer within {self.timeout_s:g} s and was killed")
             failure, result = connection.recv()
@@ -228,6 +229,8 @@ class _Crew:
     def __init__(self) -> None:
         self.processes: list[BaseProcess] = []
         self.connections: list[Connection] = []
+        self.pollers: list[select.poll] = []
+        """Kept, because `Connection.poll` builds one at every call."""
 
     def hire(self, post: Post) -> None:
         context = multiprocessing.get_context("spawn")
@@ -238,6 +241,8 @@ class _Crew:
         there.close()  # the worker holds the only other end: its death reads as the end of the pipe
         self.processes.append(process)
         self.connections.append(here)
+        self.pollers.append(select.poll())
+        self.pollers[-1].register(here.fileno(), select.POLLIN)
 
     def dismiss(self) -> None:
         for connection in self.connections:

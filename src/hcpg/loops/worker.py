@@ -62,17 +62,17 @@ class Post(NamedTuple):
 
 def board_fields(sizes: Sizes) -> list[tuple[str, tuple[int, ...], type]]:
     """Name, shape and type of each array of the board, in the order they lie in memory."""
-    N, O, A, W = sizes.environments, sizes.observation, sizes.action, sizes.workers
+    each = sizes.environments
     return [
-        ("starts", (N,), np.int64),
-        ("busy", (W,), np.int64),
-        ("observations", (N, O), np.float32),
-        ("next_observations", (N, O), np.float32),
-        ("actions", (N, A), np.float32),
-        ("rewards", (N,), np.float32),
-        ("terminated", (N,), np.bool_),
-        ("truncated", (N,), np.bool_),
-        ("success", (N,), np.bool_),
+        ("starts", (each,), np.int64),
+        ("busy", (sizes.workers,), np.int64),
+        ("observations", (each, sizes.observation), np.float32),
+        ("next_observations", (each, sizes.observation), np.float32),
+        ("actions", (each, sizes.action), np.float32),
+        ("rewards", (each,), np.float32),
+        ("terminated", (each,), np.bool_),
+        ("truncated", (each,), np.bool_),
+        ("success", (each,), np.bool_),
     ]
 
 
@@ -81,11 +81,11 @@ def board_bytes(sizes: Sizes) -> int:
     return sum(int(np.prod(shape)) * np.dtype(kind).itemsize for _, shape, kind in board_fields(sizes))
 
 
-def board_in(buffer: memoryview | bytearray, sizes: Sizes) -> Board:
-    """The board that lies in `buffer`; the widest types come first, so every array is aligned."""
+def board_in(memory: SharedMemory, sizes: Sizes) -> Board:
+    """The board that lies in `memory`; the widest types come first, so every array is aligned."""
     arrays, offset = {}, 0
     for name, shape, kind in board_fields(sizes):
-        arrays[name] = np.ndarray(shape, kind, buffer, offset)
+        arrays[name] = np.ndarray(shape, kind, memory.buf, offset)
         offset += arrays[name].nbytes
     return Board(**arrays)
 
@@ -175,7 +175,7 @@ def serve(connection: Connection, post: Post) -> None:
     """
     threading.Thread(target=_leave_with_parent, daemon=True).start()
     memory = SharedMemory(post.memory)
-    board = board_in(memory.buf, post.sizes)
+    board = board_in(memory, post.sizes)
     try:
         _answer_commands(connection, post, board)
     except (EOFError, BrokenPipeError, ConnectionResetError):

@@ -1,7 +1,8 @@
 """A point gripper that reaches, grasps and carries: no simulator, and an optimum known on paper.
 
-One step moves the tool by at most 0.02 m along each axis. The gripper has a spring: it closes only under a firm
-command (above 0.5) and takes seven steps of full command, so that a random or averaged command holds nothing.
+One step moves the tool by at most 0.02 m along each axis. The gripper has a spring: it closes only under a
+firm command (above 0.5) and takes seven steps of full command, so that a random or averaged command holds
+nothing.
 """
 
 import math
@@ -30,6 +31,11 @@ HIGH = np.array([0.25, 0.25, 0.35])
 """Corners of the tool's workspace, m."""
 VARIANTS = ("reach", "carry")
 OBSERVATION_SIZE, ACTION_SIZE = 11, 4
+PICTURE_PIXELS, VIEW_M = 240, 0.56
+"""Side of each square view."""
+Ink = tuple[int, int, int]
+PAPER, WORKSPACE, TOOL = (232, 232, 228), (250, 250, 248), (52, 58, 70)
+OBJECT, HELD, GOAL = (214, 120, 44), (190, 48, 48), (38, 140, 92)
 
 
 class PointEnvironment:
@@ -67,7 +73,9 @@ class PointEnvironment:
 
     def render(self) -> UInt8[np.ndarray, "H W 3"]:
         """The view from above beside the view from the front."""
-        return np.zeros((64, 128, 3), np.uint8)
+        from_above = self._draw(across=0, up=1)
+        from_front = self._draw(across=0, up=2)
+        return np.concatenate([from_above, from_front], axis=1)
 
     def close(self) -> None:
         """Nothing to free."""
@@ -90,6 +98,34 @@ class PointEnvironment:
         firm = 1.0 if self._held else (1.0 - self._opening) * (reach <= RADIUS_M) / 2
         placed = (1.0 - math.tanh(carry / 0.1)) * self._held
         return 0.2 * near + 0.2 * firm + 0.6 * placed, carry <= RADIUS_M
+
+    def _draw(self, across: int, up: int) -> UInt8[np.ndarray, "S S 3"]:
+        """One square view; `across` and `up` are the axes to the right and to the top."""
+        picture = np.full((PICTURE_PIXELS, PICTURE_PIXELS, 3), PAPER, np.uint8)
+        middle, half = (LOW + HIGH) / 2, (HIGH - LOW) / 2
+        metres = (np.arange(PICTURE_PIXELS) + 0.5) / PICTURE_PIXELS * VIEW_M - VIEW_M / 2
+        right, top = middle[across] + metres, (middle[up] - metres)[:, None]
+
+        def paint(
+            centre: Float[np.ndarray, " 3"], half_width_m: float, half_height_m: float, ink: Ink
+        ) -> None:
+            inside_across = np.abs(right - centre[across]) <= half_width_m
+            picture[inside_across & (np.abs(top - centre[up]) <= half_height_m)] = ink
+
+        def ring(centre: Float[np.ndarray, " 3"], radius_m: float, ink: Ink) -> None:
+            distance = np.hypot(right - centre[across], top - centre[up])
+            picture[np.abs(distance - radius_m) <= VIEW_M / PICTURE_PIXELS] = ink
+
+        paint(middle, half[across], half[up], WORKSPACE)
+        ring(self._goal, RADIUS_M, GOAL)
+        ring(self._goal, RADIUS_M / 4, GOAL)
+        paint(self._object, 0.012, 0.012, HELD if self._held else OBJECT)
+        gap_m = 0.015 + 0.015 * self._opening
+        axes = np.eye(3)
+        for side in (-gap_m, gap_m):
+            paint(self._tool + side * axes[across], 0.003, 0.015, TOOL)
+        paint(self._tool + 0.018 * axes[up], gap_m + 0.003, 0.003, TOOL)
+        return picture
 
     def _observe(self) -> Float[np.ndarray, " O"]:
         observation = np.empty(OBSERVATION_SIZE, np.float32)
