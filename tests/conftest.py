@@ -1,0 +1,24 @@
+"""What holds for every test: one thread per process, JAX on the CPU, compiled programs kept between runs.
+
+The variables are set before JAX is imported. NumPy may be loaded already (by a pytest plug-in): its one
+thread holds for the processes started from here, so for the workers of `pytest -n 2` and for child processes.
+"""
+
+import os
+from pathlib import Path
+
+from hypothesis import settings
+
+_CACHE = Path(__file__).parents[1] / ".cache"
+_ONE_THREAD_XLA = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("XLA_FLAGS", _ONE_THREAD_XLA)
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_CACHE / "jax"))
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
+
+# The same examples on every machine: a failure seen once is seen again. No deadline: the first call compiles.
+settings.register_profile("hcpg", derandomize=True, deadline=None, database=None)
+settings.load_profile("hcpg")
