@@ -141,5 +141,5 @@ def from_json(config: dict[str, Any]) -> Settings:
 
 
 def _selector(fields: dict[str, Any]) -> Selector:
-    pairs = {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
-    return Selector(**pairs)
+    pairs = {name: tuple(value) for name, value in fields.items() if isinstance(value, list)}
+    return Selector(**{**fields, **pairs})

@@ -36,12 +36,21 @@ class Journal:
         self._pending: dict[str, list[np.ndarray]] = {}
         self._recent = [deque[bool](maxlen=RECENT_EPISODES) for _ in seeds]
         self._last_row = (time.monotonic(), 0)
+        self._evaluated: list[set[int]] = [set() for _ in seeds]
         self.alive = [True] * len(seeds)
         """For each run whether it still trains: False once it diverged."""
 
     def begin(self, step: int) -> None:
-        """Rates count from here."""
+        """A sitting begins: rates count from here, and evaluations already written down are known."""
         self._last_row = (time.monotonic(), step)
+        self._evaluated = [
+            {row["step"] for row in folder.rows("episodes") if row["phase"] == "evaluation"}
+            for folder in self._folders
+        ]
+
+    def has_evaluation(self, step: int) -> bool:
+        """Whether every running run's evaluation at `step` is written down."""
+        return all(step in self._evaluated[run] for run in self._running())
 
     def metrics(self, values: Mapping[str, Any]) -> None:
         """Keep metrics [R] until the next row, which has their means; NaN is "not reported"."""
@@ -73,8 +82,11 @@ class Journal:
             self._notify(Event("progress", self._seeds[run], row))
 
     def evaluation(self, step: int, rows: list[Records]) -> None:
-        """Write down an evaluation of every run."""
+        """Write down an evaluation of every run that lacks it."""
         for run in self._running():
+            if step in self._evaluated[run]:
+                continue
+            self._evaluated[run].add(step)
             self._folders[run].append("episodes", rows[run])
             names = dict.fromkeys(row["selector"] for row in rows[run])
             counts = {
@@ -82,7 +94,7 @@ class Journal:
             }
             told = {name: [sum(each), len(each)] for name, each in counts.items()}
             self._notify(Event("evaluation", self._seeds[run], {"step": step, "successes": told}))
-        self.begin(step)
+        self._last_row = (time.monotonic(), step)  # the evaluation's time is not training's
 
     def diverged(self, run: int, step: int, quantity: str) -> None:
         """Close the page of a run in which `quantity` is not finite any more."""

@@ -1,5 +1,6 @@
 """A population's position written to and read from its runs' checkpoints."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,29 +49,48 @@ class Saver:
 
 
 def restore(trainer: Trainer, folders: list[RunFolder], pool: Pool) -> Position:
-    """The position of the runs' newest checkpoints; rows written after them are dropped.
+    """The position of the newest checkpoint that all runs have; rows written after it are dropped.
 
     Every simulator is brought back by replaying the actions of its running episode.
 
     Raises:
-        CheckpointError: there is no sound checkpoint, the runs are at different steps, or a simulator
+        CheckpointError: there is no sound checkpoint, the runs have none in common, or a simulator
             does not come back to the observation it was left at.
     """
-    loaded = [_load(trainer, folder) for folder in folders]
-    ticks = [facts["tick"] for _, _, facts in loaded]
-    if len(set(ticks)) > 1:
-        raise CheckpointError(f"the runs are at different ticks, {ticks}; resume them one by one.")
+    paths = _common(folders)
+    loaded = [_load(trainer, path) for path in paths]
     facts = loaded[0][2]
-    states, memory = trainer.empty()
+    _, memory = trainer.empty()
     states = stack([trees["state"] for trees, _, _ in loaded])
     parts = [part for _, part, _ in loaded]
-    memory = replay.refill(memory, parts, facts["inserted"])
     episodes = _joined([each["episodes"] for _, _, each in loaded])
     observations = np.concatenate([np.asarray(trees["observations"]["next"]) for trees, _, _ in loaded])
     _bring_back(trainer, pool, episodes, parts, facts["inserted"], observations)
     for folder in folders:
-        folder.rewind(ticks[0] * trainer.settings.budget.environments)
-    return Position(ticks[0], states, memory, episodes, observations, facts["wall_s"])
+        folder.rewind(checkpoints.step_of(paths[0]))
+    return Position(
+        facts["tick"],
+        states,
+        replay.refill(memory, parts, facts["inserted"]),
+        episodes,
+        observations,
+        np.ones(len(folders), bool),
+        facts["wall_s"],
+    )
+
+
+def _common(folders: list[RunFolder]) -> list[Path]:
+    """The newest checkpoint at one and the same step: a kill may fall between two runs' saves."""
+    newest = [checkpoints.latest(folder.checkpoints) for folder in folders]
+    for folder, path in zip(folders, newest, strict=True):
+        if path is None:
+            raise CheckpointError(f"run {folder.path} has no checkpoint to resume from; start a new run.")
+    step = min(checkpoints.step_of(path) for path in newest if path is not None)
+    paths = [checkpoints.latest(folder.checkpoints, not_after=step) for folder in folders]
+    found = [path for path in paths if path is not None and checkpoints.step_of(path) == step]
+    if len(found) < len(folders):
+        raise CheckpointError(f"not all runs have a checkpoint at step {step}; resume them one by one.")
+    return found
 
 
 def load_state(folder: RunFolder, template: Any, step: int | None = None) -> tuple[Any, int]:
@@ -79,24 +99,16 @@ def load_state(folder: RunFolder, template: Any, step: int | None = None) -> tup
     Raises:
         CheckpointError: there is no such checkpoint.
     """
-    path = checkpoints.latest(folder.checkpoints)
-    if step is not None:
-        path = folder.checkpoints / f"step_{step:09d}"
-    if path is None or not path.exists():
+    path = checkpoints.latest(folder.checkpoints, not_after=step)
+    if path is None or step not in (None, checkpoints.step_of(path)):
         kept = sorted(each.name for each in folder.checkpoints.glob("step_*"))
-        raise CheckpointError(
-            f"run {folder.path} has no such checkpoint. There are: {', '.join(kept) or 'none'}."
-        )
+        wanted = "checkpoint" if step is None else f"checkpoint at step {step}"
+        raise CheckpointError(f"run {folder.path} has no {wanted}. There are: {', '.join(kept) or 'none'}.")
     trees, _ = checkpoints.load(path, {"state": template})
-    return trees["state"], int(path.name.removeprefix("step_"))
+    return trees["state"], checkpoints.step_of(path)
 
 
-def _load(
-    trainer: Trainer, folder: RunFolder
-) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[str, Any]]:
-    path = checkpoints.latest(folder.checkpoints)
-    if path is None:
-        raise CheckpointError(f"run {folder.path} has no checkpoint to resume from; start a new run.")
+def _load(trainer: Trainer, path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[str, Any]]:
     environments, size = trainer.settings.budget.environments, trainer.spec.observation_size
     templates = {
         "state": take(trainer.empty()[0], 0),

@@ -32,8 +32,19 @@ class Position(NamedTuple):
     episodes: Episodes
     observations: np.ndarray
     """[R * E, O], what to act on next."""
+    finite: Any
+    """[R], whether every number of a run's state is finite."""
     wall_s: float
     """Time spent so far, earlier sittings included."""
+
+
+class Sent(NamedTuple):
+    """What the environments were told."""
+
+    actions: np.ndarray
+    """[R * E, A]."""
+    next_starts: np.ndarray
+    """[R * E], where an environment goes on if its episode ends."""
 
 
 class Trainer:
@@ -76,28 +87,37 @@ class Trainer:
     def empty(self) -> tuple[Any, replay.Replay]:
         """Fresh states and an empty replay, which also serve as templates for a checkpoint."""
         capacity = self.settings.budget.replay_capacity
-        return self._initial, replay.create(len(self.seeds), capacity, self.spec)
+        initial = jax.tree.map(jnp.copy, self._initial)  # the learner consumes what it is given
+        return initial, replay.create(len(self.seeds), capacity, self.spec)
 
     def fresh(self, pool: Pool) -> Position:
         """The position at step 0."""
         states, memory = self.empty()
         starts = self._starts(np.zeros(pool.size, np.int64))
-        return Position(0, states, memory, Episodes.begin(starts), pool.reset(starts), 0.0)
+        return Position(
+            0, states, memory, Episodes.begin(starts), pool.reset(starts), self._all_finite(), 0.0
+        )
 
     def train(
         self, pool: Pool, position: Position, save: Callable[[Position], None], stop: Callable[[], bool]
     ) -> Position:
         """Go on from `position` to the end of the budget, or until `stop` says so or all runs diverged.
 
-        `save` is called after every evaluation and before this returns or raises, with the last whole
-        position: a failing environment loses nothing.
+        `save` is called after every evaluation and before this returns or raises: a failing environment
+        loses nothing that was learned.
         """
         began = time.monotonic() - position.wall_s
         self.journal.begin(self.step(position))
         try:
+            self._evaluate(position, save)  # due here if the last sitting failed while it evaluated
             while position.tick < self.schedule.ticks() and any(self.journal.alive) and not stop():
-                position = self._advance(pool, position)._replace(wall_s=time.monotonic() - began)
-                self._report(position, save)
+                position, sent = self._send(pool, position)
+                position = self._receive(pool, position, sent)
+                position = position._replace(wall_s=time.monotonic() - began)
+                if self.schedule.logs(position.tick):
+                    updates = int(position.states.updates)
+                    self.journal.row(self.step(position), updates, position.wall_s)
+                self._evaluate(position, save)
         finally:
             self.evaluator.close()
             save(position)
@@ -107,34 +127,41 @@ class Trainer:
         """Environment steps of one run so far."""
         return position.tick * self.settings.budget.environments
 
-    def _report(self, position: Position, save: Callable[[Position], None]) -> None:
+    def _evaluate(self, position: Position, save: Callable[[Position], None]) -> None:
         step = self.step(position)
-        if self.schedule.logs(position.tick):
-            self.journal.row(step, int(position.states.updates), position.wall_s)
-        if self.schedule.evaluates(position.tick):
+        if self.schedule.evaluates(position.tick) and not self.journal.has_evaluation(step):
             self.journal.evaluation(step, self.evaluator.evaluate(position.states, step, self.workers))
             save(position)
 
-    def _advance(self, pool: Pool, position: Position) -> Position:
-        """One tick: the environments step while the learner learns from what came before."""
-        actions = self._choose(position)
-        next_starts = self._starts(position.episodes.number + 1)
-        pool.send(actions, next_starts)
-        states, finite = self._improve(position)
+    def _send(self, pool: Pool, position: Position) -> tuple[Position, Sent]:
+        """Hand out actions; while the environments step, learn from what came before."""
+        sent = Sent(self._choose(position), self._starts(position.episodes.number + 1))
+        pool.send(*sent)
+        if not self.schedule.learns(position.tick):
+            return position, sent
+        keys = self._keys[Stream.REPLAY], self._keys[Stream.LEARNING]
+        states, metrics, finite = self._learn(position.states, position.replay, *keys)
+        self.journal.metrics(metrics)
+        return position._replace(states=states, finite=finite), sent
+
+    def _receive(self, pool: Pool, position: Position, sent: Sent) -> Position:
+        """Take in what the environments answered."""
         arrival = pool.receive()
         tick = position.tick + 1
-        self._note_divergence(tick, states, arrival, np.asarray(finite))
-        episodes, records = position.episodes.advance(arrival, next_starts)
+        self._note_divergence(tick, position, arrival)
+        episodes, records = position.episodes.advance(arrival, sent.next_starts)
         self._note_episodes(tick, records)
         brought = Batch(
             position.observations,
-            actions,
+            sent.actions,
             arrival.rewards,
             arrival.next_observations,
             arrival.terminated.astype(np.float32),
         )
         memory = self._insert(position.replay, jax.tree.map(self._per_run, brought))
-        return Position(tick, states, memory, episodes, arrival.observations, position.wall_s)
+        return position._replace(
+            tick=tick, replay=memory, episodes=episodes, observations=arrival.observations
+        )
 
     def _choose(self, position: Position) -> np.ndarray:
         """Actions [R * E, A]."""
@@ -149,26 +176,18 @@ class Trainer:
         actions[~np.isfinite(actions).all(axis=1)] = 0.0  # a diverged run's; its simulators idle
         return actions
 
-    def _improve(self, position: Position) -> tuple[Any, Any]:
-        """The states after this tick's updates, and for each run whether they are finite."""
-        if not self.schedule.learns(position.tick):
-            return position.states, np.ones(len(self.seeds), bool)
-        keys = self._keys[Stream.REPLAY], self._keys[Stream.LEARNING]
-        states, metrics, finite = self._learn(position.states, position.replay, *keys)
-        self.journal.metrics(metrics)
-        return states, finite
-
-    def _note_divergence(self, tick: int, states: Any, arrival: Arrival, finite: np.ndarray) -> None:
-        rewards = self._per_run(np.isfinite(arrival.rewards)).all(axis=1)
-        observations = self._per_run(np.isfinite(arrival.next_observations)).all(axis=(1, 2))
-        for run in np.flatnonzero(~(rewards & observations & finite) & np.asarray(self.journal.alive)):
-            if not rewards[run]:
-                quantity = "reward"
-            elif not observations[run]:
-                quantity = "observation"
-            else:
-                quantity = learning.first_bad_leaf(take(states, run))
-            self.journal.diverged(run, tick * self.settings.budget.environments, quantity)
+    def _note_divergence(self, tick: int, position: Position, arrival: Arrival) -> None:
+        sound = {
+            "reward": self._per_run(np.isfinite(arrival.rewards)).all(axis=1),
+            "observation": self._per_run(np.isfinite(arrival.next_observations)).all(axis=(1, 2)),
+            "state": np.asarray(position.finite),
+        }
+        for run in range(len(self.seeds)):
+            wrong = [quantity for quantity, fine in sound.items() if not fine[run]]
+            if wrong and self.journal.alive[run]:
+                leaf = learning.first_bad_leaf(take(position.states, run))
+                quantity = leaf if wrong[0] == "state" else wrong[0]
+                self.journal.diverged(run, tick * self.settings.budget.environments, quantity)
 
     def _note_episodes(self, tick: int, records: list[dict[str, Any]]) -> None:
         environments = self.settings.budget.environments
@@ -180,6 +199,9 @@ class Trainer:
                 if record["environment"] in own
             ]
             self.journal.episodes(tick * environments, run, mine)
+
+    def _all_finite(self) -> np.ndarray:
+        return np.ones(len(self.seeds), bool)
 
     def _starts(self, numbers: np.ndarray) -> np.ndarray:
         """The start state of every environment's episode with that number."""

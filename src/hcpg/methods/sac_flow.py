@@ -10,6 +10,7 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from hcpg.interfaces import Metrics
 from hcpg.networks.critics import Critics, CriticState, CrossQ, Polyak, Target
+from hcpg.networks.descent import descend, rest
 from hcpg.networks.flow import FlowActor, Noise
 from hcpg.networks.velocity import FieldMoments
 from hcpg.types import Batch, Spec
@@ -88,9 +89,9 @@ class SACFlow:
             actor.field.moments(),
             critic,
             log_temperature,
-            self._adam(config.actor_learning_rate).init(actor),
-            self._adam(config.critic_learning_rate).init(critic.networks),
-            self._adam(config.temperature_learning_rate).init(log_temperature),
+            rest(self._adam(config.actor_learning_rate), actor),
+            rest(self._adam(config.critic_learning_rate), critic.networks),
+            rest(self._adam(config.temperature_learning_rate), log_temperature),
             jnp.zeros((), jnp.int32),
         )
 
@@ -137,8 +138,8 @@ class SACFlow:
             state.critic.networks, state.critic, batch, following
         )
         adam = self._adam(self.config.critic_learning_rate)
-        step, optimizer = adam.update(gradient, state.critic_optimizer)
-        critic = critic._replace(networks=optax.apply_updates(critic.networks, step))
+        networks, optimizer = descend(adam, gradient, state.critic_optimizer, critic.networks)
+        critic = critic._replace(networks=networks)
         state = state._replace(critic=self.critics.follow(critic), critic_optimizer=optimizer)
         return state, {"critic_loss": loss, "value": values.mean()}
 
@@ -150,16 +151,18 @@ class SACFlow:
             state.actor, state, batch.observations, noise
         )
         adam = self._adam(self.config.actor_learning_rate)
-        step, actor_optimizer = adam.update(gradient, state.actor_optimizer)
+        actor, actor_optimizer = descend(adam, gradient, state.actor_optimizer, state.actor)
         surplus = entropy - self.config.target_entropy
         slope = jnp.exp(state.log_temperature) * surplus
         adam = self._adam(self.config.temperature_learning_rate)
-        temperature_step, temperature_optimizer = adam.update(slope, state.temperature_optimizer)
+        log_temperature, temperature_optimizer = descend(
+            adam, slope, state.temperature_optimizer, state.log_temperature
+        )
         state = state._replace(
-            actor=optax.apply_updates(state.actor, step),
+            actor=actor,
             actor_moments=moments,
             actor_optimizer=actor_optimizer,
-            log_temperature=state.log_temperature + temperature_step,
+            log_temperature=log_temperature,
             temperature_optimizer=temperature_optimizer,
         )
         norm = optax.global_norm(gradient)

@@ -47,7 +47,9 @@ class Deviation(eqx.Module):
     last: Dense
 
     @classmethod
-    def create(cls, key: PRNGKeyArray, observation_size: int, action_size: int, hidden_size: int):  # noqa: ANN206
+    def create(
+        cls, key: PRNGKeyArray, observation_size: int, action_size: int, hidden_size: int
+    ) -> "Deviation":
         """Two hidden ReLU layers."""
         keys = jax.random.split(key, 3)
         return cls(
