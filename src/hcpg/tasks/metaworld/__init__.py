@@ -1,1 +1,93 @@
-"""Tasks of Meta-World."""
+"""Tasks of Meta-World: what its 39 observed numbers mean, and the pieces that its adapters are made of.
+
+Adapters take one observation or a batch, from NumPy, JAX (also under `jit`) or PyTorch, and read nothing
+else. World axes: x to the robot's right, y away from it, z up.
+"""
+
+from hcpg.selection.arrays import length, namespace
+from hcpg.types import Bool, Float, Scene, Tensor
+
+HORIZON = 500
+CONTROL = (
+    "one unit moves the hand's target 0.01 m along a world axis; "
+    "the fourth entry is the fingers' effort: above 0 closes, below 0 opens"
+)
+
+HAND = slice(0, 3)
+"""Position of the hand, well above the fingertips."""
+OPENING = 3
+"""Gap between the fingers: 1 open, 0.27 closed on nothing."""
+OBJECT = slice(4, 7)
+QUATERNION = slice(7, 11)
+"""Of the object; scalar first in button-press and drawer-open, last in the other four tasks of the paper."""
+SECOND_OBJECT = slice(11, 14)
+SECOND_QUATERNION = slice(14, 18)
+"""Zeros, like its position, where a task has one object."""
+PREVIOUS = slice(18, 36)
+"""The 18 numbers above, one step earlier."""
+GOAL = slice(36, 39)
+
+TIP_BELOW_HAND_M = 0.045
+
+
+def read_paper_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
+    """Hand, object and goal as observed; no contact flag is observed, so a distance gate decides.
+
+    Source: paper, equation (4).
+    """
+    return Scene.of(observation[..., HAND], observation[..., OBJECT], observation[..., GOAL])
+
+
+def moved(
+    point: Float[Tensor, "*batch 3"], x: Tensor | float = 0.0, y: Tensor | float = 0.0, z: Tensor | float = 0.0
+) -> Float[Tensor, "*batch 3"]:
+    """The point shifted along the world axes, m."""
+    return namespace(point).stack([point[..., 0] + x, point[..., 1] + y, point[..., 2] + z], axis=-1)
+
+
+def tip(observation: Float[Tensor, "*batch O"]) -> Float[Tensor, "*batch 3"]:
+    """The point between the fingertips."""
+    return moved(observation[..., HAND], z=-TIP_BELOW_HAND_M)
+
+
+def flat(vector: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3"]:
+    """The vector's part in the plane of the table."""
+    return moved(vector, z=-vector[..., 2])
+
+
+def planar_distance(one: Float[Tensor, "*batch 3"], other: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch"]:
+    """How far apart two points are seen from above, m."""
+    return length(flat(one - other))
+
+
+def funnel(
+    tool: Float[Tensor, "*batch 3"], target: Float[Tensor, "*batch 3"], radius_m: float, height_m: float
+) -> Float[Tensor, "*batch 3"]:
+    """Where to go to arrive at `target` from above (from below where the height is negative).
+
+    As long as the tool is more than `radius_m` away, seen from above, that is `height_m` above the target.
+    """
+    outside = flag(planar_distance(tool, target) > radius_m, target)
+    return moved(target, z=height_m * outside)
+
+
+def flag(condition: Bool[Tensor, "*batch"], like: Float[Tensor, "*batch N"]) -> Float[Tensor, "*batch"]:
+    """1 where the condition holds, 0 elsewhere, in the dtype of `like`."""
+    xp, first = namespace(like), like[..., 0]
+    return xp.where(condition, xp.ones_like(first), xp.zeros_like(first))
+
+
+def rotated(
+    quaternion: Float[Tensor, "*batch 4"], vector: tuple[float, float, float]
+) -> Float[Tensor, "*batch 3"]:
+    """A vector of the object's own frame, in world axes; the quaternion's scalar comes last."""
+    x, y, z, w = (quaternion[..., axis] for axis in range(4))
+    along_x, along_y, along_z = vector
+    return namespace(quaternion).stack(
+        [
+            (1 - 2 * (y * y + z * z)) * along_x + 2 * (x * y - z * w) * along_y + 2 * (x * z + y * w) * along_z,
+            2 * (x * y + z * w) * along_x + (1 - 2 * (x * x + z * z)) * along_y + 2 * (y * z - x * w) * along_z,
+            2 * (x * z - y * w) * along_x + 2 * (y * z + x * w) * along_y + (1 - 2 * (x * x + y * y)) * along_z,
+        ],
+        axis=-1,
+    )
