@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from multiprocessing.shared_memory import SharedMemory
 from multiprocessing.util import Finalize
-from typing import Any, NamedTuple, NoReturn, Self
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -74,8 +74,8 @@ class Pool:
         self._task, self._seeds, self._waiting = task, [int(seed) for seed in seeds], False
         sizes = Sizes(self.size, *self.spec, workers=min(workers, self.size))
         memory = SharedMemory(create=True, size=board_bytes(sizes))
+        self._board: Board = board_in(memory, sizes)  # before the memory: freed in this order, too
         self._memory: SharedMemory | None = memory
-        self._board: Board = board_in(memory, sizes)
         self._board.busy[:] = NOBODY
         self._starts = np.full(self.size, -1)
         self._shares = np.array_split(np.arange(self.size), sizes.workers)
@@ -119,8 +119,11 @@ class Pool:
         """What the actions last sent brought; waits for the slowest worker. The caller may keep the arrays.
 
         Raises:
-            WorkerError: a worker crashed, hung or raised an error.
+            WorkerError: a worker crashed, hung or raised an error; nothing but `close` makes sense then.
+            RuntimeError: nothing was sent.
         """
+        if not self._waiting:
+            raise RuntimeError("receive() without send(): there is nothing to wait for")
         self._answers()
         board = self._board
         arrival = Arrival(
@@ -163,7 +166,7 @@ class Pool:
             self._memory.close()
             self._memory = None
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "Pool":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -197,7 +200,8 @@ class Pool:
         try:
             if not self._crew.pollers[worker].poll(max(0.0, deadline - time.monotonic()) * 1000):
                 self._crew.processes[worker].kill()
-                self._report(worker, f"gave no answer within {self.timeout_s:g} s and was killed")
+                cure = "if its simulator is only slow, make the pool with a larger timeout_s"
+                self._report(worker, f"gave no answer within {self.timeout_s:g} s and was killed; {cure}")
             failure, result = connection.recv()
         except (EOFError, ConnectionResetError):
             self._report_death(worker)
@@ -208,9 +212,14 @@ class Pool:
     def _report_death(self, worker: int) -> NoReturn:
         process = self._crew.processes[worker]
         process.join(GRACE_S)
-        code = process.exitcode or 0
-        how = f"signal {-code} ({signal.Signals(-code).name})" if code < 0 else f"exit code {code}"
-        self._report(worker, f"died with {how}")
+        code = process.exitcode
+        how = (
+            f"exit code {code}"
+            if code is None or code >= 0
+            else f"signal {-code} ({signal.strsignal(-code)})"
+        )
+        hint = "; if nobody sent it, the system ran out of memory: use fewer workers" if code == -9 else ""
+        self._report(worker, f"died with {how}{hint}")
 
     def _report(self, worker: int, what: str) -> NoReturn:
         index = int(self._board.busy[worker])

@@ -7,7 +7,7 @@ heavy: a worker costs the simulator and NumPy, not JAX.
 import os
 import threading
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection
 from multiprocessing.shared_memory import SharedMemory
@@ -33,7 +33,7 @@ class Sizes(NamedTuple):
 
 
 class Board(NamedTuple):
-    """The shared arrays; only `actions` and `starts` are written by the parent."""
+    """The shared arrays: the parent writes `actions` and `starts`, the workers all the others."""
 
     observations: Float[np.ndarray, "N O"]
     next_observations: Float[np.ndarray, "N O"]
@@ -170,8 +170,8 @@ class Station:
 def serve(connection: Connection, post: Post) -> None:
     """Answer the parent's commands until it hangs up; the body of a worker process.
 
-    Every command is `(name, arguments)`; every answer is `(None, result)`, or `(traceback, environment)` when
-    the simulator raised an error, after which the worker is gone.
+    A command is `(method of the station, arguments)`; an answer is `(None, result)`, or `(traceback, None)`
+    when the simulator raised an error: `Board.busy` then names the environment, and the worker ends.
     """
     threading.Thread(target=_leave_with_parent, daemon=True).start()
     memory = SharedMemory(post.memory)
@@ -186,20 +186,23 @@ def serve(connection: Connection, post: Post) -> None:
 
 
 def _answer_commands(connection: Connection, post: Post, board: Board) -> None:
+    failure, station = _attempt(_open_station, post, board)
+    connection.send((failure, None))
     try:
-        station = _open_station(post, board)
-        connection.send((None, None))
-        while True:
+        while failure is None:
             name, arguments = connection.recv()
-            connection.send((None, _obey(station, name, arguments)))
-    except (EOFError, BrokenPipeError, ConnectionResetError):
-        raise
+            failure, result = _attempt(getattr(station, name), *arguments)
+            connection.send((failure, result))
+    finally:
+        if station is not None:
+            station.close()
+
+
+def _attempt(call: Callable[..., Any], *arguments: Any) -> tuple[str | None, Any]:
+    try:
+        return None, call(*arguments)
     except Exception:  # whatever a simulator raises is the parent's to report
-        connection.send((traceback.format_exc(), int(board.busy[post.worker])))
-
-
-def _obey(station: Station, name: str, arguments: Sequence[Any]) -> Any:
-    return getattr(station, name)(*arguments)
+        return traceback.format_exc(), None
 
 
 def _open_station(post: Post, board: Board) -> Station:
