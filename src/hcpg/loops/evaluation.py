@@ -1,6 +1,6 @@
 """The evaluation protocol: fixed start states, once with the selector and once bare."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import jax
@@ -37,13 +37,15 @@ class Evaluator:
         """The list of start states, for the manifest."""
         return {"set_seed": EVALUATION_SEED, "starts": list(range(self.episodes))}
 
-    def evaluate(self, states: Any, step: int, workers: int) -> list[list[dict[str, Any]]]:
-        """For each run, a row per episode: all with the selector, then all bare."""
+    def evaluate(
+        self, states: Any, step: int, workers: int, names: Iterable[str] | None = None
+    ) -> list[list[dict[str, Any]]]:
+        """For each run, a row per episode: all with the selector, then all bare (or only `names`)."""
         if self._pool is None:
             seeds = [EVALUATION_SEED] * (self._slots * len(self._seeds))
             self._pool = Pool(self._settings.task, seeds, workers=workers)
         rows: list[list[dict[str, Any]]] = [[] for _ in self._seeds]
-        for name in self._policies:
+        for name in self._policies if names is None else names:
             for first in range(0, self.episodes, self._slots):
                 starts = np.arange(first, min(first + self._slots, self.episodes))
                 for run, records in enumerate(self._wave(name, states, step, starts)):

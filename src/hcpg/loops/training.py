@@ -67,7 +67,8 @@ class Trainer:
         read_scene = task.adapters[settings.adapter]
         self.evaluator = Evaluator(settings, self.method, read_scene, seeds)
         self._keys = {each: jnp.stack([streams.key(seed, each) for seed in seeds]) for each in Stream}
-        self._initial = stack([self.method.init(key) for key in self._keys[Stream.NETWORKS]])
+        fresh = jax.jit(self.method.init)  # compiled as one program instead of a hundred small ones
+        self._initial = jax.jit(stack)([fresh(key) for key in self._keys[Stream.NETWORKS]])
         self._compile(read_scene)
 
     def _compile(self, read_scene: Any) -> None:

@@ -1,0 +1,1 @@
+"""One file per subcommand of `hcpg`; each has `run(arguments) -> exit code`."""
