@@ -28,6 +28,17 @@ class Moments(NamedTuple):
         return cls(jnp.zeros(features), jnp.ones(features), jnp.zeros((), jnp.int32))
 
 
+def standardise(moments: Moments, x: Float[Array, "*batch F"]) -> Float[Array, "*batch F"]:
+    """`x` by the running moments alone: nothing learned, nothing shared between rows."""
+    return (x - moments.mean) * jax.lax.rsqrt(moments.variance + EPSILON)
+
+
+def observe(moments: Moments, x: Float[Array, "B F"]) -> Moments:
+    """The running moments after one more batch."""
+    mean = x.mean(axis=0)
+    return _observe(moments, mean, jnp.square(x - mean).mean(axis=0), 1)
+
+
 class BatchRenorm(eqx.Module):
     """The learned scale and bias of one batch-renormalisation layer.
 

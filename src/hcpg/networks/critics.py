@@ -7,7 +7,7 @@ import jax
 from jax import numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
-from hcpg.networks.batch_renorm import BatchRenorm, Moments
+from hcpg.networks.batch_renorm import BatchRenorm, Moments, observe, standardise
 from hcpg.networks.dense import Dense
 from hcpg.types import Batch
 
@@ -20,7 +20,7 @@ class CriticState(NamedTuple):
     networks: PyTree
     """Parameters that gradients move, stacked over the N critics."""
     moments: PyTree
-    """Running statistics (crossq), else empty."""
+    """Running statistics: of every layer's input (crossq), of the critics' input (polyak)."""
     target: PyTree
     """Averaged parameters (polyak), else empty."""
 
@@ -110,7 +110,11 @@ class CrossQ(NamedTuple):
 
 
 class Polyak(NamedTuple):
-    """LayerNorm critics with exponentially averaged target networks."""
+    """LayerNorm critics with exponentially averaged target networks.
+
+    Their inputs are standardised by running moments, as batch renorm does for `CrossQ`: positions in metres
+    differ by centimetres where it matters, and a critic that sees them raw hardly tells actions apart.
+    """
 
     hidden_size: int
     critics: int = 2
@@ -120,7 +124,7 @@ class Polyak(NamedTuple):
         """N critics, and targets equal to them."""
         create = jax.vmap(lambda each: _LayerNetwork.create(each, inputs, self.hidden_size))
         networks = create(jax.random.split(key, self.critics))
-        return CriticState(networks, (), jax.tree.map(jnp.copy, networks))
+        return CriticState(networks, Moments.create(inputs), jax.tree.map(jnp.copy, networks))
 
     def loss(
         self, networks: PyTree, state: CriticState, batch: Batch, following: Target
@@ -128,20 +132,24 @@ class Polyak(NamedTuple):
         """Regression on the targets' values of the next step."""
         now = jnp.concatenate([batch.observations, batch.actions], axis=-1)
         then = jnp.concatenate([batch.next_observations, following.actions], axis=-1)
-        evaluate = jax.vmap(_LayerNetwork.__call__, in_axes=(0, None))
-        values = evaluate(networks, now)
-        target = bellman_target(batch, evaluate(state.target, then), following)
+        state = state._replace(moments=observe(state.moments, now))
+        values = self._evaluate(networks, state, now)
+        target = bellman_target(batch, self._evaluate(state.target, state, then), following)
         return regression(values, target), (state, values)
 
     def values(self, state: CriticState, inputs: Float[Array, "B I"]) -> Values:
         """Values of the online critics."""
-        return jax.vmap(_LayerNetwork.__call__, in_axes=(0, None))(state.networks, inputs)
+        return self._evaluate(state.networks, state, inputs)
 
     def follow(self, state: CriticState) -> CriticState:
         """Targets moved by `target_rate` towards the online critics."""
         rate = self.target_rate
         target = jax.tree.map(lambda old, new: (1 - rate) * old + rate * new, state.target, state.networks)
         return state._replace(target=target)
+
+    def _evaluate(self, networks: PyTree, state: CriticState, inputs: Float[Array, "B I"]) -> Values:
+        evaluate = jax.vmap(_LayerNetwork.__call__, in_axes=(0, None))
+        return evaluate(networks, standardise(state.moments, inputs))
 
 
 class _RenormNetwork(eqx.Module):

@@ -77,7 +77,7 @@ class GatedVelocity(eqx.Module):
 
     def velocity(
         self,
-        drive: Float[Array, "*batch H"],
+        drive: Float[Array, "*state H"],
         normalised: Float[Array, "*batch A"],
         sample: Float[Array, "*batch A"],
     ) -> Float[Array, "*batch A"]:
