@@ -1,0 +1,22 @@
+"""One gradient step: Adam's first one has the length of the learning rate, whatever the slope."""
+
+import numpy as np
+import optax
+from jax import numpy as jnp
+
+from hcpg.networks.descent import descend
+
+
+def test_adams_first_step_is_the_learning_rate_against_the_sign():
+    parameters, optimizer = jnp.array([1.0, 1.0, 1.0]), optax.adam(0.01, b1=0.5)
+    moved, _ = descend(optimizer, jnp.array([1e-3, -4.0, 0.0]), optimizer.init(parameters), parameters)
+    np.testing.assert_allclose(moved, [0.99, 1.01, 1.0], atol=1e-6)
+
+
+def test_the_second_step_remembers_the_first():
+    optimizer = optax.adam(0.01, b1=0.5)
+    state, parameter = optimizer.init(jnp.array(0.0)), jnp.array(0.0)
+    for gradient in (1.0, -1.0):
+        parameter, state = descend(optimizer, jnp.array(gradient), state, parameter)
+    # m = (0.5 * 0.5 - 0.5) / (1 - 0.25) = -1 / 3, v = 1: back by a third of the first step
+    np.testing.assert_allclose(parameter, -0.01 + 0.01 / 3, atol=1e-7)
