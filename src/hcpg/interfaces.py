@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from hcpg.types import Batch, Float, Scene, Spec, Step, Tensor, UInt8
 
@@ -10,6 +10,7 @@ Metrics = Mapping[str, Tensor]
 ReadScene = Callable[[Float[Tensor, "*batch O"]], Scene]
 
 
+@runtime_checkable
 class Method(Protocol):
     """A learner bound to its `config` and `spec`; every call is pure.
 
@@ -61,6 +62,7 @@ class Task:
     """Readers of the scene by family: `paper` (the paper's reading), `contact` (ours)."""
 
 
+@runtime_checkable
 class Environment(Protocol):
     """One simulator, one episode at a time; NumPy in and out; never resets itself."""
 
@@ -84,6 +86,7 @@ class Environment(Protocol):
         ...
 
 
+@runtime_checkable
 class Suite(Protocol):
     """One simulator package; the module's `SUITE`."""
 

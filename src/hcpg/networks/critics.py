@@ -1,6 +1,6 @@
 """Twin critics in two recipes: `crossq` (batch renorm, no target) and `polyak` (target networks)."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -34,6 +34,7 @@ class Target(NamedTuple):
     discount: float
 
 
+@runtime_checkable
 class Critics(Protocol):
     """A recipe for twin critics."""
 
