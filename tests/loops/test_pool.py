@@ -215,7 +215,7 @@ def test_a_killed_worker_is_reported_with_all_that_matters(dies_before_send):
         actions = np.array([[0.0, 0.0, 0.0, 0.0], [0.25, 0.5, -1.0, 1.0]], np.float32)
         if dies_before_send:
             os.kill(second, signal.SIGKILL)
-            assert gone_within(5, [second])
+            assert gone_within(20, [second])
         else:
             os.kill(second, signal.SIGSTOP)
             threading.Timer(0.2, os.kill, [second, signal.SIGKILL]).start()
@@ -239,8 +239,8 @@ def test_a_hung_worker_is_reported_and_ended():
             WorkerError, match=r"environment 0 \(seed 11, start state 3.*no answer within 0.3 s"
         ):
             pool.receive()
-        assert 0.3 <= time.monotonic() - started < 2.0
-        assert gone_within(5, [first])
+        assert 0.3 <= time.monotonic() - started < 10.0
+        assert gone_within(20, [first])
 
 
 def test_an_error_of_the_simulator_arrives_with_its_traceback():
@@ -269,15 +269,23 @@ def test_the_start_state_in_the_report_follows_the_episodes():
             pool.receive()
 
 
+def shared_memory_of_this_process():
+    maps = Path("/proc/self/maps").read_text().splitlines()
+    return [line.partition("/dev/shm/")[2] for line in maps if "/dev/shm/psm_" in line]
+
+
 def test_close_twice_leaves_no_worker_and_no_shared_memory():
-    before = set(os.listdir("/dev/shm"))
+    before = shared_memory_of_this_process()
     pool = Pool(TASK, [0, 1], workers=2)
     workers = workers_of(os.getpid())
     assert len(workers) == 2
-    assert set(os.listdir("/dev/shm")) == before
+    # One mapping more, and its name is gone already: nothing can be left behind in the file system.
+    [mapping] = set(shared_memory_of_this_process()) - set(before)
+    assert mapping.endswith(" (deleted)")
     pool.close()
     pool.close()
     assert not any(map(alive, workers))
+    assert shared_memory_of_this_process() == before
 
 
 SCRIPT = """
@@ -314,7 +322,7 @@ def test_workers_end_when_the_parent_is_killed(script):
         workers = workers_of(parent.pid)
         assert len(workers) == 2
         parent.kill()
-        assert gone_within(5, workers)
+        assert gone_within(20, workers)
 
 
 def test_ctrl_c_and_sigterm_are_the_parents_alone(script):
@@ -327,13 +335,13 @@ def test_ctrl_c_and_sigterm_are_the_parents_alone(script):
         time.sleep(0.2)
         assert all(map(alive, workers))
         os.killpg(parent.pid, signal.SIGINT)
-        assert "KeyboardInterrupt" in parent.communicate(timeout=20)[1]
-        assert gone_within(5, workers)
+        assert "KeyboardInterrupt" in parent.communicate(timeout=60)[1]
+        assert gone_within(20, workers)
 
 
 def test_a_forgotten_pool_ends_with_its_program_in_silence(script):
     with start(script, "end") as parent:
-        assert parent.communicate(timeout=20) == ("ready\n", "")
+        assert parent.communicate(timeout=60) == ("ready\n", "")
         assert parent.returncode == 0
 
 

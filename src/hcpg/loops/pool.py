@@ -139,11 +139,11 @@ class Pool:
         return arrival
 
     def restore(
-        self, starts: Int[np.ndarray, " N"], actions: Sequence[Float[np.ndarray, "T A"]]
+        self, starts: Int[np.ndarray, " N"], actions: Sequence[Float[np.ndarray, "_ A"]]
     ) -> Float[np.ndarray, "N O"]:
         """The observations after each start state and its own list of actions.
 
-        Continues every episode exactly where a checkpoint left it.
+        Continues every episode exactly where a checkpoint left it; the lists may differ in length.
         """
         self._begin(starts)
         for worker, share in enumerate(self._shares):

@@ -113,7 +113,7 @@ class Station:
             self._step(index)
         self._board.busy[self._worker] = NOBODY
 
-    def restore(self, actions: Mapping[int, Float[np.ndarray, "T A"]]) -> None:
+    def restore(self, actions: Mapping[int, Float[np.ndarray, "_ A"]]) -> None:
         """Begin an episode in every environment and repeat the given actions.
 
         Raises:
