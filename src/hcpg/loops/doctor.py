@@ -172,10 +172,11 @@ def jax_flags(environment: Mapping[str, str]) -> Finding:
 
 def rendering(environment: Mapping[str, str] = os.environ) -> Finding:
     """Whether MuJoCo draws a picture without a display, under `environment`."""
-    backend = environment.get("MUJOCO_GL", "osmesa")
+    backend = environment.get("MUJOCO_GL") or "egl"
     answer = _probe(_RENDERING_PROBE, {**environment, "MUJOCO_GL": backend})
-    cure = "sudo scripts/install_system_packages.sh, or: sudo apt-get install libosmesa6"
-    return _finding("rendering", answer.ok, f"MUJOCO_GL={backend}: {answer.line}", cure)
+    cure = "sudo scripts/install_system_packages.sh, or: sudo apt-get install libegl1 libgl1-mesa-dri"
+    cure += "" if backend == "egl" else "; then: unset MUJOCO_GL"
+    return _finding("rendering", answer.ok or "warning", f"MUJOCO_GL={backend}: {answer.line}", cure)
 
 
 def ffmpeg() -> Finding:
