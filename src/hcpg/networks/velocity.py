@@ -8,7 +8,7 @@ from jax import numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from hcpg.networks.batch_renorm import BatchRenorm, Moments
-from hcpg.networks.dense import Dense
+from hcpg.networks.dense import Dense, swish
 
 TIME_FREQUENCIES = 16
 TIME_HIDDEN = 64
@@ -69,7 +69,7 @@ class GatedVelocity(eqx.Module):
     ) -> Float[Array, "M *batch H"]:
         """The first layer's share that does not depend on the sample, for all steps at once."""
         observation_size = normalised.shape[-1]
-        features = self.time_outer(jax.nn.swish(self.time_inner(_fourier(times))))
+        features = self.time_outer(swish(self.time_inner(_fourier(times))))
         of_time = features @ self.inner.kernel[-TIME_SIZE:] + self.inner.bias
         of_observation = normalised @ self.inner.kernel[:observation_size]
         axes = (slice(None),) + (None,) * (normalised.ndim - 1)
@@ -84,7 +84,7 @@ class GatedVelocity(eqx.Module):
         """The velocity at one step, from that step's `drive` and the (normalised) sample."""
         observation_size, action_size = self.observation_norm.bias.size, sample.shape[-1]
         kernel = self.inner.kernel[observation_size : observation_size + action_size]
-        hidden = jax.nn.swish(drive + normalised @ kernel)
+        hidden = swish(drive + normalised @ kernel)
         of_gate, of_candidate = jnp.split(hidden, 2, axis=-1)
         gate = jax.nn.sigmoid(self.gate(of_gate))
         return gate * (self.candidate(of_candidate) - sample)
