@@ -11,12 +11,12 @@ from hcpg.selection import RULES, Scene, Selector, select
 COUNT, SIZE, SETS = 4, 7, 24
 
 
-@pytest.fixture(params=[True, False], ids=["flag", "gate"])
-def problem(request, generator):
-    """Half of the tools stand within the gate."""
+@pytest.fixture
+def problem(generator):
+    """Proposals, scenes with a flag (half of the tools stand within the gate), lots, values."""
     thing, goal = generator.normal(size=(2, SETS, 3))
     tool = thing + generator.normal(size=(SETS, 3)) * np.where(np.arange(SETS) % 2, 0.02, 0.5)[:, None]
-    scene = Scene.of(tool, thing, goal, contact=generator.uniform(size=SETS) if request.param else None)
+    scene = Scene.of(tool, thing, goal, contact=generator.uniform(size=SETS))
     extras = generator.uniform(size=(2, SETS, COUNT))
     return generator.uniform(-1, 1, (SETS, COUNT, SIZE)), scene, *extras
 
@@ -54,6 +54,17 @@ class TestAgreement:
     def test_jax_mapped(self, typed, dtype, tolerance):
         with jax.enable_x64(dtype == np.float64):
             agree(jax.jit(jax.vmap(every_rule)), jnp.asarray, typed, tolerance)
+
+
+@pytest.mark.parametrize(("call", "convert"), [(select, torch.asarray), (jax.jit(select), jnp.asarray)])
+def test_the_gate_agrees(call, convert, problem):
+    proposals, scene = jax.tree.map(lambda part: part.astype(np.float32), problem[:2])
+    gated = scene._replace(contact=None)
+    action, seen = call(convert(proposals), jax.tree.map(convert, gated))
+    expected, expected_seen = select(proposals, gated)
+    assert expected_seen.phase.tolist() == [0.0, 1.0] * (SETS // 2)
+    np.testing.assert_allclose(seen.phase, expected_seen.phase)
+    np.testing.assert_allclose(action, expected, atol=1e-5)
 
 
 def test_jax_eager(flagged_scene):

@@ -53,7 +53,7 @@ SELECTORS = st.builds(
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=120)
 @given(data=st.data())
 def test_numpy(dtype, data):
     proposals, scene, noise, values = data.draw(problems(dtype))
@@ -76,12 +76,28 @@ def every_rule(proposals, scene, noise, values):
     return [select(proposals, scene, selector, noise=noise, values=values) for selector in selectors]
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=60)
 @given(problem=problems(np.float32, subnormal=False, count=COUNT))
 def test_jax_compiled(problem):
     # XLA treats subnormal numbers as 0 on a CPU, so none are given.
     for action, seen in every_rule(*jax.tree.map(jnp.asarray, problem)):
         check(problem[0], action, seen)
+
+
+LARGEST = np.finfo(np.float32).max
+REMOTE = Scene.of(np.zeros(3, np.float32), np.array([LARGEST, 0, 0], np.float32), np.zeros(3, np.float32))
+MOVES = np.array([[0.5, 0, 0, 0, 0], [-0.5, 0, 0, 0, 0], [0, 0.5, 0, 0, 0], [0, 0, 0.5, 0, 0]], np.float32)
+
+
+@pytest.mark.parametrize("convert", [np.asarray, jnp.asarray, torch.asarray])
+def test_the_largest_numbers_keep_their_meaning(convert):
+    scene = jax.tree.map(convert, REMOTE)
+    values = convert(np.array([LARGEST, -LARGEST, -LARGEST, -LARGEST]))
+    compiled = jax.jit(select, static_argnums=2) if convert is jnp.asarray else select
+    _, seen = compiled(convert(MOVES), scene, Selector(rule="value_soft"), values=values)
+    assert np.asarray(seen.scores) == pytest.approx([0.475, -0.525, -0.025, -0.025])
+    # One outlier of four weighs at most this.
+    assert float(seen.weights[0]) == pytest.approx(1 / (1 + 3 * np.exp(-(3**0.5 + 3**-0.5) / 0.7)), abs=1e-5)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -55,14 +55,18 @@ def like(array: Tensor, reference: Tensor) -> Tensor:
 
 
 def bounded(array: Float[Tensor, "*shape"], divisor: float) -> Float[Tensor, "*shape"]:
-    """`array` within plus and minus the dtype's largest number / `divisor`, so that sums stay finite."""
+    """`array` within plus and minus the dtype's largest number / `divisor`, so that sums stay finite.
+
+    From a divisor of 16 on, its reciprocals survive too: a compiler may multiply by them, and the
+    reciprocal of the largest number is so small that hardware rounds it to 0.
+    """
     xp = namespace(array)
     limit = float(xp.finfo(array.dtype).max) / divisor
     return xp.clip(array, -limit, limit)
 
 
 def length(vector: Float[Tensor, "*batch D"]) -> Float[Tensor, "*batch"]:
-    """Euclidean norm over the last axis; its squares neither overflow nor vanish."""
+    """Euclidean norm over the last axis, of a `bounded` vector; its squares neither overflow nor vanish."""
     xp = namespace(vector)
     largest = xp.max(xp.abs(vector), axis=-1, keepdims=True)
     unit = xp.where(largest > 0, largest, 1.0)

@@ -20,10 +20,10 @@ def standardise(
     """
     xp = namespace(scores)
     share = equal_weights(usable, scores.dtype)
-    finite = bounded(xp.where(usable, scores, 0.0), 4.0)
+    finite = bounded(xp.where(usable, scores, 0.0), 16.0)
     centred = xp.where(usable, finite - xp.sum(share * finite, axis=-1, keepdims=True), 0.0)
     # In units of the largest deviation the squares cannot overflow, and the quotient is the same.
-    unit = xp.maximum(xp.max(xp.abs(centred), axis=-1, keepdims=True), epsilon)
+    unit = xp.clip(xp.max(xp.abs(centred), axis=-1, keepdims=True), epsilon, None)
     centred = centred / unit
     deviation = xp.sqrt(xp.sum(share * centred**2, axis=-1, keepdims=True))
     return centred / xp.maximum(deviation, epsilon / unit)
@@ -35,9 +35,11 @@ def soft_weights(
     temperature: float,
     top_k: int | None = None,
 ) -> Float[Tensor, "*batch K"]:
-    """Softmax over the usable candidates, or over the `top_k` best of them; the weights sum to 1.
+    """Softmax over the usable candidates; the weights sum to 1.
 
-    Source: paper, equation (10), left; the truncation is the option it leaves unused.
+    `top_k` keeps only that many best ones, an option that the paper leaves unused.
+
+    Source: paper, equation (10).
     """
     xp = namespace(standardised)
     logits = xp.where(usable, standardised / temperature, -float("inf"))
@@ -45,14 +47,14 @@ def soft_weights(
     peak = xp.max(logits, axis=-1, keepdims=True)
     raised = xp.exp(xp.where(kept, logits - peak, -float("inf")))
     # The best candidate contributes exp(0), so the sum is below 1 only where no candidate is usable.
-    return raised / xp.maximum(xp.sum(raised, axis=-1, keepdims=True), 1.0)
+    return raised / xp.clip(xp.sum(raised, axis=-1, keepdims=True), 1.0, None)
 
 
 def equal_weights(usable: Bool[Tensor, "*batch K"], dtype: Any) -> Float[Tensor, "*batch K"]:
     """The same weight for every usable candidate; they sum to 1."""
     xp = namespace(usable)
     chosen = xp.asarray(usable, dtype=dtype)
-    return chosen / xp.maximum(xp.sum(chosen, axis=-1, keepdims=True), 1.0)
+    return chosen / xp.clip(xp.sum(chosen, axis=-1, keepdims=True), 1.0, None)
 
 
 def blend(
@@ -65,7 +67,7 @@ def blend(
 
     NaN where no candidate is usable, so that a later look at the numbers stops it.
 
-    Source: paper, equation (10), right.
+    Source: paper, equation (10).
     """
     xp = namespace(proposals)
     chosen = usable[..., None]

@@ -18,9 +18,10 @@ def directional_progress(
     """
     xp = namespace(translations)
     # Dividing by the largest component first, target / max(norm, epsilon) needs no large square.
-    unit = xp.maximum(xp.max(xp.abs(target), axis=-1, keepdims=True), epsilon)
+    target = bounded(target, 16.0)
+    unit = xp.clip(xp.max(xp.abs(target), axis=-1, keepdims=True), epsilon, None)
     scaled = target / unit
-    direction = scaled / xp.maximum(length(scaled), 1.0)[..., None]
+    direction = scaled / xp.clip(length(scaled), 1.0, None)[..., None]
     return xp.sum(translations * direction[..., None, :], axis=-1)
 
 
@@ -50,11 +51,11 @@ def score(
 ) -> Float[Tensor, "*batch K"]:
     """Progress in the phase that holds, less a small price for large moves; in the translation's units.
 
-    A component beyond an eighth of the dtype's largest number (less with a large penalty) counts as that.
+    A component beyond a 32nd of the dtype's largest number (less with the penalty) counts as that limit.
 
     Source: paper, equation (8).
     """
-    moves = bounded(translations, 8.0 * (1.0 + action_penalty))
+    moves = bounded(translations, 32.0 * (1.0 + action_penalty))
     after = phase[..., None]
     before_contact = directional_progress(moves, approach, epsilon)
     after_contact = directional_progress(moves, task, epsilon)

@@ -55,7 +55,7 @@ def select(
         ValueError: an unknown rule, a shape that does not fit, a number that is not finite, or noise or
             values that the rule needs and that are missing.
 
-    Source: paper, Algorithm 1, lines 2 to 7.
+    Source: paper, Algorithm 1.
     """
     selector = rule if isinstance(rule, Selector) else Selector(rule=rule)
     inputs = gather(proposals, scene, selector, noise, values)
@@ -91,11 +91,11 @@ def _distances(
     xp = namespace(proposals)
     *batch, count, size = proposals.shape
     chosen = usable[..., None]
-    points = xp.where(chosen, bounded(proposals, 4.0 * count * size), 0.0)
-    left = xp.maximum(xp.sum(xp.asarray(usable, dtype=points.dtype), axis=-1), 1.0)
+    points = xp.where(chosen, bounded(proposals, 16.0 * count * size), 0.0)
+    left = xp.clip(xp.sum(xp.asarray(usable, dtype=points.dtype), axis=-1), 1.0, None)
     centre = xp.sum(points, axis=-2, keepdims=True) / left[..., None, None]
     offsets = xp.where(chosen, points - centre, 0.0)
     spread = length(xp.reshape(offsets, (*batch, count * size))) / xp.sqrt(left)
-    reach = length(bounded(action, 4.0 * count * size)[..., None, :] - points)
+    reach = length(bounded(action, 16.0 * count * size)[..., None, :] - points)
     gap = xp.min(xp.where(usable, reach, float("inf")), axis=-1)
     return spread, gap

@@ -125,7 +125,8 @@ def _permuted(selector: Selector, evidence: Evidence) -> Tensor:
     weights = _hcpg(selector, evidence)
     xp = namespace(weights)
     lots = xp.where(evidence.usable, evidence.noise, -float("inf"))
-    return xp.take_along_axis(-xp.sort(-weights, axis=-1), ranks(lots), axis=-1)
+    dealt = ranks(lots)[..., :, None] == ranks(weights)[..., None, :]
+    return xp.sum(xp.where(dealt, weights[..., None, :], 0.0), axis=-1)
 
 
 def _value(selector: Selector, evidence: Evidence) -> Tensor:
