@@ -20,7 +20,8 @@ def git(folder, *arguments):
 
 @pytest.fixture
 def checkout(tmp_path):
-    (tmp_path / "requirements.lock").write_text("numpy==2.0\n")
+    (tmp_path / "requirements").mkdir()
+    (tmp_path / "requirements" / "run.txt").write_text("numpy==2.0\n")
     git(tmp_path, "init", "-q")
     git(tmp_path, "add", ".")
     git(tmp_path, "commit", "-q", "-m", "one")
@@ -61,7 +62,7 @@ def test_versions_are_the_imported_ones():
 
 
 def test_code_names_commit_changes_and_locks(checkout):
-    lock = {"requirements.lock": hashlib.sha256(b"numpy==2.0\n").hexdigest()}
+    lock = {"run.txt": hashlib.sha256(b"numpy==2.0\n").hexdigest()}
     commit = git(checkout, "rev-parse", "HEAD")
     assert code(checkout) == {"commit": commit, "dirty": False, "locks": lock}
     (checkout / "new.py").write_text("")

@@ -66,7 +66,8 @@ def code(root: Path) -> dict[str, Any]:
 
     The commit is None where the package was installed from a wheel, or without git.
     """
-    locks = {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in sorted(root.glob("*.lock"))}
+    files = sorted((root / "requirements").glob("*.txt"))
+    locks = {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
     checkout = (root / ".git").exists() and shutil.which("git") is not None
     commit = _git(root, "rev-parse", "HEAD") if checkout else None
     altered = _git(root, "status", "--porcelain") if checkout else None

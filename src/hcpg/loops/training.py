@@ -87,7 +87,8 @@ class Trainer:
 
     def empty(self) -> tuple[Any, replay.Replay]:
         """Fresh states and an empty replay, which also serve as templates for a checkpoint."""
-        capacity = self.settings.budget.replay_capacity
+        ever_inserted = self.schedule.ticks() * self.settings.budget.environments
+        capacity = min(self.settings.budget.replay_capacity, ever_inserted)
         initial = jax.tree.map(jnp.copy, self._initial)  # the learner consumes what it is given
         return initial, replay.create(len(self.seeds), capacity, self.spec)
 

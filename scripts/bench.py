@@ -1,0 +1,146 @@
+"""Speed of this machine's CPU preset against its peers: ratios, each measured in one run. `make bench`."""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+ENVIRONMENT = {
+    **os.environ,
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "JAX_PLATFORMS": "cpu",
+    "PYTHONWARNINGS": "ignore",
+}
+
+
+def together(commands: list[list[str]], pinned: bool) -> list[dict]:
+    """Run benchmark modules side by side, started at the same moment; their JSON answers."""
+    cores = sorted(os.sched_getaffinity(0))
+    processes = []
+    for index, (module, *arguments) in enumerate(commands):
+        pin = ["taskset", "-c", str(cores[index % len(cores)])] if pinned else []
+        command = [*pin, sys.executable, "-m", f"benchmarks.{module}", *arguments]
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        processes.append(subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT, **pipes))
+    for process in processes:
+        for line in process.stdout:
+            if line.strip() == "ready":
+                break
+    for process in processes:
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    answers = [process.communicate()[0] for process in processes]
+    failed = [process.args for process in processes if process.returncode]
+    if failed:
+        raise SystemExit(f"benchmark failed: {failed}")
+    return [json.loads(answer.strip().splitlines()[-1]) for answer in answers]
+
+
+def gradient_steps() -> list[tuple[str, float, str]]:
+    """Share of one core's matrix-product rate; three seeds against one."""
+    one = together([["gradient_step"]], pinned=True)[0]
+    alone = together([["gradient_step"]], pinned=False)[0]
+    three = together([["gradient_step"]] * 3, pinned=False)
+    slowdown = max(each["seconds"] for each in three) / alone["seconds"]
+    share = one["rate"] / one["products"]
+    print(f"  {one['operations'] / 1e9:.2f} GFLOP per update at {one['rate'] / 1e9:.0f} GFLOP/s;", end=" ")
+    print(f"matrix products {one['products'] / 1e9:.0f} GFLOP/s on one core")
+    return [
+        ("gradient step / matrix-product rate of one core", share, ">= 0.6"),
+        ("three seeds on all cores / one seed, time", slowdown, "<= 1.7"),
+    ]
+
+
+def pool() -> list[tuple[str, float, str]]:
+    """The pool against cores times one bare environment."""
+    answer = _one("pool_rate")
+    print(f"  bare {answer['bare']:.0f} steps/s, pool {answer['pool']:.0f} on {answer['cores']} cores")
+    return [("pool / (cores x one bare environment)", answer["ratio"], ">= 0.85")]
+
+
+def training() -> list[tuple[str, float, str]]:
+    """Two seeds of ours against two runs of a peer, one a core, whole training."""
+    rates = {}
+    for name, command in {
+        "hcpg_flow": ["ours", "hcpg_flow"],
+        "SBX SAC": ["peer", "SAC"],
+        "SBX CrossQ": ["peer", "CrossQ"],
+        "hcpg_flow again": ["ours", "hcpg_flow"],
+    }.items():
+        answers = together([[*command, "0"], [*command, "1"]], pinned=True)
+        rates[name] = sum(answer["steps_per_s"] for answer in answers)
+        print(f"  {name}: {rates[name]:.0f} environment steps/s over two runs")
+    ours = (rates["hcpg_flow"] + rates["hcpg_flow again"]) / 2
+    return [
+        ("whole training, ours / SBX SAC", ours / rates["SBX SAC"], ">= 1.0"),
+        ("whole training, ours / SBX CrossQ", ours / rates["SBX CrossQ"], ">= 1.3"),
+    ]
+
+
+def selection() -> list[tuple[str, float, str]]:
+    """What the selector adds to proposing four actions."""
+    answer = _one("selection_cost")
+    print(
+        f"  propose {answer['propose_us']:.0f} us, with selection {answer['with_selection_us']:.0f} us;",
+        end=" ",
+    )
+    print(f"NumPy's selection alone {answer['numpy_us']:.0f} us")
+    return [("selection / propose, K=4, time", answer["share"], "< 0.05")]
+
+
+def memory() -> list[tuple[str, float, str]]:
+    """Peak memory of the demo's two runs, workers included, over its first evaluation."""
+    command = [sys.executable, "scripts/demo.py", "--budget.steps", "8000", "--budget.evaluations", "1"]
+    process = subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT, stdout=subprocess.DEVNULL)
+    peak = 0.0
+    while process.poll() is None:
+        peak = max(peak, _proportional_bytes(process.pid))
+        time.sleep(0.5)
+    if process.returncode:
+        raise SystemExit("benchmark failed: the demo ended with an error")
+    return [("memory of the demo at its peak, GiB", peak / 2**30, "< 2")]
+
+
+def _proportional_bytes(pid: int) -> float:
+    """Memory of a process and all its children; a shared page counts once (PSS)."""
+    import psutil
+
+    total = 0
+    for process in [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]:
+        try:
+            total += process.memory_full_info().pss
+        except (psutil.NoSuchProcess, psutil.AccessDenied):
+            continue  # it ended while we were looking
+    return total
+
+
+def _one(module: str) -> dict:
+    command = [sys.executable, "-m", f"benchmarks.{module}"]
+    answer = subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, check=True, capture_output=True, text=True)
+    return json.loads(answer.stdout.strip().splitlines()[-1])
+
+
+PARTS = {part.__name__: part for part in (gradient_steps, pool, training, selection, memory)}
+
+
+def main() -> None:
+    """Run the parts asked for, then print one table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="default: all")
+    rows = []
+    for name in parser.parse_args().parts or PARTS:
+        print(f"{name} ...", flush=True)
+        rows += PARTS[name]()
+    width = max(len(label) for label, _, _ in rows)
+    print(f"\n{'measured in this run':<{width}}  ratio  wanted")
+    for label, ratio, wanted in rows:
+        print(f"{label:<{width}}  {ratio:5.2f}  {wanted}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+"""Train hcpg_flow and sac_flow side by side; end with a table, their curves and a video. `make demo`.
+
+Options are those of `hcpg train`, e.g. --seeds 0 1 2. Ctrl-C saves; the message says how to go on.
+"""
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from hcpg import cli
+from hcpg.report.figures import learning_curves
+from hcpg.report.records import Record, find_runs, load_runs
+from hcpg.report.tables import markdown
+
+ROOT = Path(__file__).resolve().parents[1]
+OUT = ROOT / "runs" / "demo"
+TASK = "metaworld/drawer-open"
+PRESETS = ("hcpg_flow", "sac_flow")
+NEEDED_BYTES = 1 << 30
+
+
+def main(options: list[str]) -> int:
+    """Train, then show what came of it; gives the exit code."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    free = shutil.disk_usage(OUT).free
+    if free < NEEDED_BYTES:
+        sys.stderr.write(f"demo: {free / 2**30:.1f} GiB are free at {OUT}, it needs 1: free some.\n")
+        return 2
+    before = set(find_runs(OUT))
+    code = cli.main(["train", "--task", TASK, "--preset", *PRESETS, "--out", str(OUT), *options])
+    made = [path for path in find_runs(OUT) if path not in before]
+    if code or not made:
+        return code
+    groups = load_runs(made)
+    stem = Path(tempfile.mkdtemp(prefix="report-", dir=OUT)) / "learning_curves"
+    table = markdown(groups)
+    stem.with_name("table.md").write_text(table)
+    picture, _ = learning_curves(groups, stem)
+    sys.stdout.write(f"\n{table}\ncurves: {picture}\ntable:  {stem.with_name('table.md')}\n")
+    for group in groups:
+        show(group.runs[0])
+    return 0
+
+
+def show(run: Record) -> None:
+    """Say where a run lies, after a video of it: none is drawn without software OpenGL."""
+    sys.stdout.write(f"\n{run.preset}, seed {run.seed}: {run.path}\nvideo: ")
+    sys.stdout.flush()
+    cli.main(["play", str(run.path), "--episodes", "2"])
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
