@@ -7,6 +7,7 @@ set of start states is drawn with a seed, after which that generator stands wher
 
 import ctypes
 import difflib
+import importlib
 import math
 import os
 from functools import lru_cache
@@ -44,7 +45,7 @@ Of the two others that scan, `stick-push` needs the answer for its success, and 
 
 PICTURE_PIXELS = 480
 CAMERA = {"lookat": (0.0, 0.68, 0.15), "distance": 1.5, "azimuth": 140.0, "elevation": -30.0}
-"""From the free side of the table, above it, m and degrees; the package's own corner cameras stand on their heads."""
+"""From the table's free side, above it; m and degrees. The package's own corner cameras are upside down."""
 OPENGL_LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
 """What each value of MUJOCO_GL that needs no display loads."""
 OPENGL_PACKAGES = "libegl1 libgl1-mesa-dri"
@@ -166,7 +167,7 @@ def _open_viewer(model: Any, data: Any) -> Any:
     # Set no earlier: MuJoCo, imported under it, would need OpenGL for training too.
     os.environ["MUJOCO_GL"] = backend
     _require_opengl_library(backend)
-    import mujoco
+    mujoco: Any = importlib.import_module("mujoco")
     from gymnasium.envs.mujoco.mujoco_rendering import OffScreenViewer
 
     try:

@@ -39,7 +39,10 @@ def read_paper_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
 
 
 def moved(
-    point: Float[Tensor, "*batch 3"], x: Tensor | float = 0.0, y: Tensor | float = 0.0, z: Tensor | float = 0.0
+    point: Float[Tensor, "*batch 3"],
+    x: Tensor | float = 0.0,
+    y: Tensor | float = 0.0,
+    z: Tensor | float = 0.0,
 ) -> Float[Tensor, "*batch 3"]:
     """The point shifted along the world axes, m."""
     return namespace(point).stack([point[..., 0] + x, point[..., 1] + y, point[..., 2] + z], axis=-1)
@@ -55,7 +58,9 @@ def flat(vector: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3"]:
     return moved(vector, z=-vector[..., 2])
 
 
-def planar_distance(one: Float[Tensor, "*batch 3"], other: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch"]:
+def planar_distance(
+    one: Float[Tensor, "*batch 3"], other: Float[Tensor, "*batch 3"]
+) -> Float[Tensor, "*batch"]:
     """How far apart two points are seen from above, m."""
     return length(flat(one - other))
 
@@ -81,13 +86,12 @@ def rotated(
     quaternion: Float[Tensor, "*batch 4"], vector: tuple[float, float, float]
 ) -> Float[Tensor, "*batch 3"]:
     """A vector of the object's own frame, in world axes; the quaternion's scalar comes last."""
-    x, y, z, w = (quaternion[..., axis] for axis in range(4))
-    along_x, along_y, along_z = vector
-    return namespace(quaternion).stack(
-        [
-            (1 - 2 * (y * y + z * z)) * along_x + 2 * (x * y - z * w) * along_y + 2 * (x * z + y * w) * along_z,
-            2 * (x * y + z * w) * along_x + (1 - 2 * (x * x + z * z)) * along_y + 2 * (y * z - x * w) * along_z,
-            2 * (x * z - y * w) * along_x + 2 * (y * z + x * w) * along_y + (1 - 2 * (x * x + y * y)) * along_z,
-        ],
-        axis=-1,
-    )
+    axis, scalar = quaternion[..., :3], quaternion[..., 3:]
+    own = moved(0.0 * axis, *vector)
+    turn = 2.0 * _cross(axis, own)
+    return own + scalar * turn + _cross(axis, turn)
+
+
+def _cross(one: Float[Tensor, "*batch 3"], other: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3"]:
+    (x, y, z), (u, v, w) = ([each[..., axis] for axis in range(3)] for each in (one, other))
+    return namespace(one).stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)

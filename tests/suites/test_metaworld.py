@@ -1,0 +1,316 @@
+"""Meta-World as a suite: its traps, its determinism, its pictures."""
+
+import ctypes
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hcpg import registry
+from hcpg.interfaces import Task
+from hcpg.suites import metaworld as suite
+from hcpg.types import Spec
+
+ROOT = Path(__file__).parents[2]
+INSTALLER = ROOT / "scripts/install_system_packages.sh"
+DRAWER = registry.task("metaworld/drawer-open")
+EVALUATION_SEED = 1_000_003
+# The package's experts command more than the box allows, and say so.
+pytestmark = pytest.mark.filterwarnings("ignore:Constant.* may be too high")
+
+
+def can_draw():
+    try:
+        ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return False
+    return True
+
+
+@pytest.fixture(scope="module")
+def drawer():
+    environment = suite.SUITE.make(DRAWER, seed=0)
+    yield environment
+    environment.close()
+
+
+def actions_of(seed, count):
+    return np.random.default_rng(seed).uniform(-1, 1, (count, 4)).astype(np.float32)
+
+
+def trajectory(environment, start, actions):
+    rows = [np.append(environment.reset(start), [0.0, 0.0])]
+    for action in actions:
+        step = environment.step(action)
+        rows.append(np.append(step.observation, [step.reward, step.success]))
+    return np.asarray(rows)
+
+
+def test_sizes_are_known_and_nothing_heavy_is_imported_for_them():
+    code = (
+        "import sys; from hcpg import registry; task = registry.task('metaworld/drawer-open')\n"
+        "print(*registry.suite('metaworld').spec(task))\n"
+        "print(*{'metaworld', 'mujoco', 'gymnasium', 'jax', 'torch'} & set(sys.modules))"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    told = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert told.stdout == "39 4\n\n"
+    assert suite.SUITE.spec(DRAWER) == Spec(39, 4)
+
+
+def test_one_seed_gives_fifty_different_starts_that_wrap_around(drawer):
+    firsts = np.asarray([drawer.reset(start) for start in range(50)])
+    assert firsts.shape == (50, 39)
+    assert firsts.dtype == np.float32
+    assert len(np.unique(firsts[:, 36:39], axis=0)) == 50
+    assert np.array_equal(drawer.reset(53), firsts[3])
+    assert np.array_equal(drawer.reset(3), firsts[3])
+
+
+def test_the_package_ignores_its_own_seed_and_ours_does_not(drawer):
+    stock = drawer._simulation
+    stock.set_task(drawer._starts[0])
+    first, _ = stock.reset(seed=5)
+    stock.set_task(drawer._starts[1])
+    second, _ = stock.reset(seed=5)
+    assert abs(first[4] - second[4]) > 0.01
+    again = suite.SUITE.make(DRAWER, seed=0)
+    other = suite.SUITE.make(DRAWER, seed=EVALUATION_SEED)
+    assert np.array_equal(again.reset(7), drawer.reset(7))
+    ours = {tuple(drawer.reset(start)[36:39]) for start in range(50)}
+    theirs = {tuple(other.reset(start)[36:39]) for start in range(50)}
+    assert len(ours) == len(theirs) == 50
+    assert ours & theirs == set()
+    again.close()
+    other.close()
+
+
+def test_episodes_repeat_bit_for_bit_whatever_came_before(drawer):
+    actions = actions_of(1, 80)
+    first = trajectory(drawer, 4, actions)
+    trajectory(drawer, 9, actions_of(2, 40))
+    fresh = suite.SUITE.make(DRAWER, seed=0)
+    assert np.array_equal(trajectory(drawer, 4, actions), first)
+    assert np.array_equal(trajectory(fresh, 4, actions), first)
+    fresh.close()
+
+
+def test_the_global_generator_is_neither_moved_nor_asked():
+    np.random.seed(3)  # noqa: NPY002 - the generator under test
+    before = np.random.get_state()  # noqa: NPY002
+    environment = suite.SUITE.make(DRAWER, seed=81)
+    first = environment.reset(0)
+    environment.step(np.zeros(4, np.float32))
+    after = np.random.get_state()  # noqa: NPY002
+    assert np.array_equal(before[1], after[1])
+    assert before[2:] == after[2:]
+    suite._start_states.cache_clear()
+    np.random.seed(4)  # noqa: NPY002
+    assert np.array_equal(suite.SUITE.make(DRAWER, seed=81).reset(0), first)
+
+
+def test_the_goal_is_visible_though_the_declared_space_holds_it_at_zero(drawer):
+    stock = drawer._simulation
+    assert np.array_equal(stock.observation_space.high[36:39], [0.0, 0.0, 0.0])
+    for start in (0, 1):
+        first = drawer.reset(start)
+        assert first[36:39] == pytest.approx(stock._target_pos, abs=1e-6)
+        assert first[37] == pytest.approx(0.54, abs=1e-3)
+        after = drawer.step(np.zeros(4, np.float32)).observation
+        assert np.array_equal(after[36:39], first[36:39])
+
+
+def test_success_means_now_and_the_episode_goes_on(drawer):
+    from metaworld.policies import SawyerDrawerOpenV3Policy
+
+    expert, observation, seen = SawyerDrawerOpenV3Policy(), drawer.reset(0), []
+    for _ in range(150):
+        action = np.clip(expert.get_action(observation.astype(np.float64)), -1, 1).astype(np.float32)
+        observation, reward, terminated, success = drawer.step(action)
+        assert (type(reward), type(success), observation.dtype) == (float, bool, np.float32)
+        # The package's condition, from the observation: handle within 3 cm of the goal.
+        assert success == (np.linalg.norm(observation[4:7] - observation[36:39]) <= 0.03)
+        assert not terminated
+        assert 0.0 <= reward <= 10.0 + 1e-6
+        seen.append(success)
+    assert not seen[0]
+    assert seen[-1]
+    assert np.sum(seen) >= 2
+
+
+def test_the_horizon_is_five_hundred_steps(drawer):
+    assert DRAWER.horizon == 500
+    drawer.reset(0)
+    for _ in range(500):
+        assert not drawer.step(np.zeros(4, np.float32)).terminated
+    with pytest.raises(ValueError, match="reset"):
+        drawer.step(np.zeros(4, np.float32))
+
+
+@pytest.mark.parametrize("action", [np.zeros(3, np.float32), np.full(4, np.nan, np.float32)])
+def test_an_action_that_is_none_is_refused(drawer, action):
+    drawer.reset(0)
+    with pytest.raises(ValueError, match="four finite numbers"):
+        drawer.step(action)
+
+
+def test_an_action_beyond_the_box_acts_like_its_edge(drawer):
+    wide, edge = np.full((5, 4), [3.0, -2.0, 0.5, 0.0]), np.full((5, 4), [1.0, -1.0, 0.5, 0.0])
+    moved = trajectory(drawer, 0, wide.astype(np.float32))
+    assert np.array_equal(moved, trajectory(drawer, 0, edge.astype(np.float32)))
+
+
+def test_wrong_addresses_are_named():
+    typo = Task("metaworld", "drawer-opne-v3", 500, "", {})
+    with pytest.raises(ValueError, match=r"no task 'drawer-opne-v3'\. Did you mean 'drawer-open-v3'\?"):
+        suite.SUITE.make(typo, seed=0)
+    with pytest.raises(ValueError, match=r"4294967295\], got -1"):
+        suite.SUITE.make(DRAWER, seed=-1)
+
+
+def test_closing_twice_is_closing():
+    environment = suite.SUITE.make(DRAWER, seed=0)
+    environment.close()
+    environment.close()
+
+
+def with_contact_answer(env_id, answer):
+    """One random episode of the stock class, as if its scan of contacts always gave `answer`."""
+    from metaworld import ALL_V3_ENVIRONMENTS
+
+    stock = ALL_V3_ENVIRONMENTS[env_id]
+    simulation = type(stock.__name__, (stock,), {"touching_main_object": answer})()
+    simulation._freeze_rand_vec, simulation._set_task_called = False, True
+    simulation.seeded_rand_vec = True
+    simulation.seed(0)
+    rows = [simulation.reset()[0]]
+    for action in actions_of(0, 5):
+        observation, reward, _, _, info = simulation.step(action)
+        rows.append(np.append(observation, [reward, info["success"]]))
+    return np.concatenate(rows)
+
+
+@pytest.mark.parametrize("env_id", sorted(suite.SCANS_CONTACTS_FOR_INFO_ONLY))
+def test_the_skipped_scan_of_contacts_feeds_neither_reward_nor_success(env_id):
+    assert np.array_equal(with_contact_answer(env_id, True), with_contact_answer(env_id, False))
+
+
+def test_skipping_the_scan_changes_no_bit_of_an_experts_episode():
+    from metaworld import ALL_V3_ENVIRONMENTS
+    from metaworld.policies import SawyerSweepIntoV3Policy
+
+    task = registry.task("metaworld/sweep-into")
+    ours, stock = suite.SUITE.make(task, seed=0), ALL_V3_ENVIRONMENTS[task.env_id]()
+    stock.set_task(ours._starts[0])
+    observation, expert, touched, succeeded = stock.reset()[0], SawyerSweepIntoV3Policy(), False, False
+    assert np.array_equal(ours.reset(0), observation.astype(np.float32))
+    for _ in range(120):
+        action = np.clip(expert.get_action(observation), -1, 1).astype(np.float32)
+        observation, reward, _, _, info = stock.step(action)
+        step = ours.step(action)
+        assert np.array_equal(step.observation, observation.astype(np.float32))
+        assert (step.reward, step.success) == (reward, bool(info["success"]))
+        touched, succeeded = touched or info["grasp_success"] > 0, succeeded or step.success
+    assert touched
+    assert succeeded
+    ours.close()
+
+
+@pytest.mark.skipif(not can_draw(), reason="needs libegl1")
+def test_pictures_need_no_display_are_upright_and_change_nothing(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    environment, actions = suite.SUITE.make(DRAWER, seed=0), actions_of(5, 30)
+    undrawn = trajectory(environment, 0, actions)
+    environment.reset(0)
+    before = environment.render()
+    drawn = [environment.step(action) for action in actions]
+    after = environment.render()
+    assert (before.shape, before.dtype) == ((480, 480, 3), np.uint8)
+    assert np.mean(before != after) > 0.01
+    assert np.array_equal(drawn[-1].observation, undrawn[-1, :39])
+    red, green, blue = np.moveaxis(before.astype(int), -1, 0)
+    arm = np.argwhere((red > 100) & (green < 60) & (blue < 60))
+    table = np.argwhere((red > green + 15) & (green > blue + 5) & (red < 160) & (green > 60))
+    assert len(arm) > 5000
+    assert len(table) > 5000
+    assert arm[:, 0].mean() + 50 < table[:, 0].mean()
+    environment.close()
+
+
+@pytest.mark.skipif(not can_draw(), reason="needs libegl1")
+def test_two_environments_draw_in_turn(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    one, other = (suite.SUITE.make(DRAWER, seed=0) for _ in range(2))
+    one.reset(0)
+    other.reset(1)
+    first, second = one.render(), other.render()
+    assert np.array_equal(one.render(), first)
+    assert np.array_equal(other.render(), second)
+    assert np.mean(first != second) > 0.01
+    one.close()
+    assert np.array_equal(other.render(), second)
+    other.close()
+
+
+def test_a_missing_library_stops_pictures_with_its_cure_and_nothing_else(monkeypatch):
+    monkeypatch.setitem(suite.OPENGL_LIBRARIES, "egl", "libNoSuchLibrary.so.1")
+    monkeypatch.setenv("MUJOCO_GL", "")
+    environment = suite.SUITE.make(DRAWER, seed=0)
+    environment.reset(0)
+    assert environment.step(np.zeros(4, np.float32)).reward >= 0.0
+    with pytest.raises(suite.RenderingError, match="libNoSuchLibrary") as stopped:
+        environment.render()
+    assert "MUJOCO_GL=egl" in str(stopped.value)
+    assert "scripts/install_system_packages.sh" in str(stopped.value)
+    assert "sudo apt-get install libegl1 libgl1-mesa-dri" in str(stopped.value)
+    environment.close()
+
+
+def test_the_users_own_choice_of_library_is_kept_and_checked_first(monkeypatch):
+    monkeypatch.setitem(suite.OPENGL_LIBRARIES, "osmesa", "libNoSuchLibrary.so.1")
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    with pytest.raises(suite.RenderingError, match="MUJOCO_GL=osmesa"):
+        suite.SUITE.make(DRAWER, seed=0)
+    assert os.environ["MUJOCO_GL"] == "osmesa"
+
+
+def install(folder, installed, *, root):
+    """Run the installer with stand-ins for what it calls; gives the process and the calls of apt-get."""
+    answers = {
+        "dpkg-query": f'case " {installed} " in *" $3 "*) echo installed;; *) exit 1;; esac',
+        "apt-get": f'echo "$*" >>{folder}/calls',
+        "id": f"echo {0 if root else 1000}",
+        "env": 'shift; exec "$@"',
+    }
+    for name, body in answers.items():
+        (folder / name).write_text(f"#!/bin/bash\n{body}\n")
+        (folder / name).chmod(0o755)
+    told = subprocess.run(
+        ["/bin/bash", INSTALLER], env={"PATH": str(folder)}, capture_output=True, text=True, check=False
+    )
+    calls = folder / "calls"
+    return told, calls.read_text().splitlines() if calls.exists() else []
+
+
+def test_the_installer_installs_what_is_missing_and_then_nothing(tmp_path):
+    told, calls = install(tmp_path, "libegl1", root=True)
+    assert told.returncode == 0
+    assert calls == ["update -qq", "install -y -qq --no-install-recommends libgl1-mesa-dri"]
+    assert "Installing libgl1-mesa-dri" in told.stdout
+    told, again = install(tmp_path, suite.OPENGL_PACKAGES, root=True)
+    assert told.returncode == 0
+    assert "Nothing to install" in told.stdout
+    assert again == calls
+
+
+def test_the_installer_says_what_it_cannot_do_without_root(tmp_path):
+    told, calls = install(tmp_path, "", root=False)
+    assert told.returncode == 1
+    assert "as root: apt-get install libegl1 libgl1-mesa-dri" in told.stderr
+    assert calls == []
