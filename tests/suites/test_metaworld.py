@@ -223,7 +223,7 @@ def test_skipping_the_scan_changes_no_bit_of_an_experts_episode():
 
 @pytest.mark.skipif(not can_draw(), reason="needs libegl1")
 def test_pictures_need_no_display_are_upright_and_change_nothing(monkeypatch):
-    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.setenv("MUJOCO_GL", "")
     monkeypatch.delenv("DISPLAY", raising=False)
     environment, actions = suite.SUITE.make(DRAWER, seed=0), actions_of(5, 30)
     undrawn = trajectory(environment, 0, actions)
@@ -246,7 +246,8 @@ def test_pictures_need_no_display_are_upright_and_change_nothing(monkeypatch):
 @pytest.mark.skipif(not can_draw(), reason="needs libegl1")
 def test_two_environments_draw_in_turn(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "egl")
-    one, other = (suite.SUITE.make(DRAWER, seed=0) for _ in range(2))
+    one = suite.SUITE.make(DRAWER, seed=0)
+    other = suite.SUITE.make(registry.task("metaworld/button-press"), seed=0)
     one.reset(0)
     other.reset(1)
     first, second = one.render(), other.render()
@@ -256,6 +257,20 @@ def test_two_environments_draw_in_turn(monkeypatch):
     one.close()
     assert np.array_equal(other.render(), second)
     other.close()
+
+
+@pytest.mark.skipif(not can_draw(), reason="needs libegl1")
+def test_a_viewer_that_nobody_closed_ends_in_silence():
+    code = (
+        "from hcpg import registry; task = registry.task('metaworld/drawer-open')\n"
+        "environment = registry.suite('metaworld').make(task, 0); environment.reset(0)\n"
+        "print(environment.render().shape)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "MUJOCO_GL": "egl"}
+    told = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert (told.stdout, told.stderr) == ("(480, 480, 3)\n", "")
 
 
 def test_a_missing_library_stops_pictures_with_its_cure_and_nothing_else(monkeypatch):

@@ -5,6 +5,7 @@ observation space has the goal at 0, so nothing reads it. Goals come from NumPy'
 set of start states is drawn with a seed, after which that generator stands where it stood.
 """
 
+import atexit
 import ctypes
 import difflib
 import importlib
@@ -95,6 +96,8 @@ class MetaworldEnvironment:
         """
         if self._viewer is None:
             self._viewer = _open_viewer(self._simulation.model, self._simulation.data)
+            # Left to the interpreter's end, a viewer outlives the library that it frees itself with.
+            atexit.register(self.close)
         self._viewer.make_context_current()
         return np.ascontiguousarray(self._viewer.render("rgb_array", camera_id=-1))
 
@@ -104,6 +107,7 @@ class MetaworldEnvironment:
         if self._viewer is not None:
             self._viewer.close()
             self._viewer = None
+            atexit.unregister(self.close)
 
 
 class MetaworldSuite:
