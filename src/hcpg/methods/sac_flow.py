@@ -165,7 +165,7 @@ class SACFlow:
             log_temperature=log_temperature,
             temperature_optimizer=temperature_optimizer,
         )
-        norm = optax.global_norm(gradient)
+        norm = optax.tree.norm(gradient)
         return state, {"actor_loss": loss, "path_entropy": entropy, "actor_gradient": norm}
 
     def _actor_loss(

@@ -147,5 +147,9 @@ def path_log_prob(
 
 
 def tanh_log_slope(x: Float[Array, "*batch A"], half_range: float = 1.0) -> Float[Array, "*batch A"]:
-    """Logarithm of the slope of `half_range * tanh(x)`, floored at log(1e-6)."""
-    return jnp.log(half_range * (1 - jnp.square(jnp.tanh(x))) + 1e-6)
+    """Logarithm of the slope of `half_range * tanh(x)`, floored at log(1e-6).
+
+    The slope is a product of sigmoids, since 1 - tanh(x)^2 has no digits left in float32 from |x| = 5 on.
+    """
+    slope = 4 * jax.nn.sigmoid(2 * x) * jax.nn.sigmoid(-2 * x)
+    return jnp.log(half_range * slope + 1e-6)

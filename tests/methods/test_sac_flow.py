@@ -1,0 +1,230 @@
+"""SAC-Flow's update against an independent one in PyTorch; its delays, keys, proposals and defaults."""
+
+from dataclasses import replace
+from functools import cache, partial
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import numpy as np
+import pytest
+import torch_sac_flow
+from jax import numpy as jnp
+
+from hcpg.methods.sac_flow import POLICY_METRICS, Config, SACFlow, State
+from hcpg.networks.batch_renorm import Moments
+from hcpg.networks.critics import CriticState
+from hcpg.networks.flow import Noise
+from hcpg.types import Batch, Spec
+
+ROWS, OBSERVATIONS, ACTIONS = 8, 5, 3
+TINY = Config(actor_hidden_size=8, critic_hidden_size=8)
+
+
+class Case(NamedTuple):
+    """One update of a moved state, at which the actor is due."""
+
+    method: SACFlow
+    before: State
+    after: State
+    metrics: dict
+    batch: Batch
+    noises: tuple
+    """For the target's next actions, and for the actor's loss."""
+
+
+@cache
+def method_of(critic):
+    return SACFlow(replace(TINY, critic=critic), Spec(OBSERVATIONS, ACTIONS))
+
+
+@cache
+def update_of(critic):
+    return jax.jit(method_of(critic).update)
+
+
+@cache
+def moved_state(critic):
+    """A state whose every parameter is off its start, so that none can be left out unnoticed."""
+
+    def move(tree, seed):
+        leaves, structure = jax.tree.flatten(tree)
+        generator = np.random.default_rng(seed)
+        shifted = [leaf + 0.1 * generator.normal(size=leaf.shape).astype(np.float32) for leaf in leaves]
+        return jax.tree.unflatten(structure, shifted)
+
+    def watched(moments):
+        generator = np.random.default_rng(moments.mean.size)
+        spread = jnp.asarray(generator.uniform(0.5, 2.0, moments.mean.shape), jnp.float32)
+        return Moments(jnp.asarray(generator.normal(size=spread.shape), jnp.float32), spread, moments.calls)
+
+    state = jax.jit(method_of(critic).init)(jax.random.key(0))
+    networks, moments, target = state.critic
+    actor = move(state.actor, 5)
+    # Less noise, so that a sample or two saturate, but not all.
+    actor = eqx.tree_at(lambda actor: actor.deviation.last.bias, actor, jnp.full(ACTIONS, -0.3))
+    watch = partial(jax.tree.map, watched, is_leaf=lambda node: isinstance(node, Moments))
+    return state._replace(
+        actor=actor,
+        actor_moments=watch(state.actor_moments),
+        critic=CriticState(move(networks, 1), watch(moments), move(target, 2)),
+    )
+
+
+@cache
+def transitions():
+    generator = np.random.default_rng(6)
+    rows = [generator.normal(size=(ROWS, OBSERVATIONS)), generator.uniform(-1, 1, (ROWS, ACTIONS))]
+    rows += [generator.normal(size=ROWS), generator.normal(size=(ROWS, OBSERVATIONS))]
+    rows += [np.arange(ROWS) % 4 == 0]
+    return Batch(*(jnp.asarray(each, jnp.float32) for each in rows))
+
+
+@pytest.fixture(scope="module", params=["crossq", "polyak"])
+def case(request):
+    before = moved_state(request.param)._replace(updates=jnp.int32(2))  # the third update: the actor is due
+    key = jax.random.key(9)
+    after, metrics = update_of(request.param)(before, transitions(), key)
+    noises = tuple(Noise.draw(each, (ROWS, ACTIONS), 4) for each in jax.random.split(key))
+    return Case(method_of(request.param), before, after, metrics, transitions(), noises)
+
+
+def gradient_of(optimizer_state):
+    """Adam's first moment after one step is (1 - beta 1) = one half of the gradient."""
+    return [2 * np.asarray(leaf) for leaf in jax.tree.leaves(optimizer_state[0].mu)]
+
+
+def assert_learned_alike(parameters, optimizer_state, reference):
+    """Gradients, and the parameters wherever the gradient is not so small that Adam's step is its noise."""
+    compared = 0
+    gradients = gradient_of(optimizer_state)
+    for own, slope, expected, expected_slope in zip(
+        jax.tree.leaves(parameters), gradients, reference.parameters, reference.gradient, strict=True
+    ):
+        np.testing.assert_allclose(slope, expected_slope, rtol=1e-4, atol=1e-5)
+        clear = np.abs(expected_slope) > 1e-4
+        np.testing.assert_allclose(np.asarray(own)[clear], expected[clear], atol=1e-5)
+        compared += clear.sum() / clear.size
+    assert compared / len(gradients) > 0.7
+
+
+def test_the_critic_update_equals_the_one_in_torch(case):
+    reference = torch_sac_flow.critic_update(case.method.config, case.before, case.batch, case.noises[0])
+    np.testing.assert_allclose(case.metrics["critic_loss"], reference.loss, rtol=1e-5)
+    np.testing.assert_allclose(case.metrics["value"], reference.extra["value"], rtol=1e-4, atol=1e-6)
+    assert_learned_alike(case.after.critic.networks, case.after.critic_optimizer, reference)
+    moments = case.after.critic.moments
+    if case.method.config.critic == "polyak":
+        pairs = [(moments, reference.extra["statistics"])]
+    else:
+        seen = reference.extra["statistics"]  # critic by critic, layer by layer
+        own = [jax.tree.map(lambda leaf, at=at: leaf[at], each) for at in (0, 1) for each in moments]
+        pairs = list(zip(own, [*seen[0], *seen[1]], strict=True))
+    for own, (mean, variance) in pairs:
+        np.testing.assert_allclose(own.mean, mean, atol=1e-5)
+        np.testing.assert_allclose(own.variance, variance, atol=1e-5)
+
+
+def test_the_actor_update_equals_the_one_in_torch(case):
+    seen = case.before._replace(critic=case.after.critic)
+    reference = torch_sac_flow.actor_update(case.method.config, seen, case.batch, case.noises[1])
+    np.testing.assert_allclose(case.metrics["actor_loss"], reference.loss, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(case.metrics["path_entropy"], reference.extra["entropy"], rtol=1e-4)
+    norm = np.sqrt(sum((slope**2).sum() for slope in reference.gradient))
+    np.testing.assert_allclose(case.metrics["actor_gradient"], norm, rtol=1e-4)
+    assert_learned_alike(case.after.actor, case.after.actor_optimizer, reference)
+    for name, (mean, variance) in reference.extra["statistics"].items():
+        moments = getattr(case.after.actor_moments, name)
+        np.testing.assert_allclose(moments.mean, mean, atol=1e-5)
+        np.testing.assert_allclose(moments.variance, variance, atol=1e-5)
+        assert int(moments.calls) == 4
+
+
+def test_the_temperature_falls_by_one_step_while_the_entropy_exceeds_its_target(case):
+    surplus = float(case.metrics["path_entropy"])
+    np.testing.assert_allclose(gradient_of(case.after.temperature_optimizer), [0.2 * surplus], rtol=1e-4)
+    step = float(case.after.log_temperature - case.before.log_temperature)
+    np.testing.assert_allclose(step, -np.sign(surplus) * 1e-3, rtol=1e-3)
+    np.testing.assert_allclose(case.metrics["temperature"], 0.2 * np.exp(step), rtol=1e-5)
+
+
+def test_targets_move_by_the_target_rate_after_the_step(case):
+    if case.method.config.critic == "crossq":
+        assert case.after.critic.target == ()
+        return
+    trees = case.before.critic.target, case.after.critic.networks, case.after.critic.target
+    for old, online, new in zip(*map(jax.tree.leaves, trees), strict=True):
+        np.testing.assert_allclose(new, 0.995 * old + 0.005 * online, atol=1e-6)
+
+
+def test_the_actor_update_leaves_the_critics_and_their_statistics_alone(case):
+    early = case.before._replace(updates=jnp.int32(0))  # the first update: only the critics are due
+    after, metrics = update_of(case.method.config.critic)(early, case.batch, jax.random.key(9))
+    for one, other in zip(*map(jax.tree.leaves, (after.critic, case.after.critic)), strict=True):
+        np.testing.assert_array_equal(one, other)
+    for one, other in zip(*map(jax.tree.leaves, (after.actor, case.before.actor)), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert int(after.actor_moments.sample.calls) == 0
+    assert all(np.isnan(metrics[name]) for name in POLICY_METRICS)
+
+
+def test_three_updates_train_the_critics_thrice_and_actor_and_temperature_once():
+    state = moved_state("crossq")
+    first = state.critic.networks.layers[2].bias
+    for index in range(3):
+        state, metrics = update_of("crossq")(state, transitions(), jax.random.key(index))
+        if index == 0:
+            steps = state.critic.networks.layers[2].bias - first
+            np.testing.assert_allclose(abs(steps), np.full((2, 1), 1e-3), rtol=1e-3)
+    optimizers = state.critic_optimizer, state.actor_optimizer, state.temperature_optimizer
+    assert [int(each[0].count) for each in optimizers] == [3, 1, 1]
+    assert int(state.updates) == 3
+    assert [each.calls.tolist() for each in state.critic.moments] == [[3, 3]] * 3
+    assert all(np.isfinite(value) for value in metrics.values())
+
+
+def test_the_defaults_are_the_official_recipe():
+    config = Config()
+    assert (config.critic, config.flow_steps, config.policy_delay) == ("crossq", 4, 3)
+    assert (config.actor_learning_rate, config.critic_learning_rate) == (3e-4, 1e-3)
+    assert (config.temperature_learning_rate, config.momentum, config.discount) == (1e-3, 0.5, 0.99)
+    assert (config.initial_temperature, config.target_entropy) == (0.2, 0.0)
+    assert (config.actor_hidden_size, config.critic_hidden_size) == (512, 1024)
+    assert abs(float(jnp.exp(moved_state("crossq").log_temperature)) - 0.2) < 1e-6
+
+
+@pytest.fixture(scope="module")
+def pairs():
+    """2000 times two proposals for one observation."""
+    method, state = method_of("crossq"), moved_state("crossq")
+    keys = jax.random.split(jax.random.key(3), 2000)
+    observation = transitions().observations[0]
+    return jax.jit(jax.vmap(lambda key: method.propose(state, observation, key, 2)))(keys)
+
+
+def test_proposals_of_one_set_are_independent_and_alike_in_distribution(pairs):
+    for action in range(ACTIONS):
+        first, second = pairs[:, 0, action], pairs[:, 1, action]
+        assert abs(np.corrcoef(first, second)[0, 1]) < 4 / np.sqrt(len(pairs))
+        assert abs(float(first.mean() - second.mean())) < 4 * float(first.std()) * np.sqrt(2 / len(pairs))
+    assert pairs.shape == (2000, 2, ACTIONS)
+    assert float(abs(pairs).max()) <= 1.0
+    assert float(pairs.std(axis=0).min()) > 0.1
+
+
+def test_the_evaluation_action_is_the_single_proposal_bit_for_bit():
+    method, state, observation = method_of("crossq"), moved_state("crossq"), transitions().observations[0]
+    act, propose = jax.jit(method.act), jax.jit(method.propose, static_argnums=3)
+    key = jax.random.key(4)
+    np.testing.assert_array_equal(act(state, observation, key), propose(state, observation, key, 1)[0])
+    assert not np.array_equal(act(state, observation, jax.random.key(5)), act(state, observation, key))
+
+
+def test_the_value_is_the_smaller_critics_of_each_action_alone(case):
+    observation, actions = case.batch.observations[0], case.batch.actions
+    value = jax.jit(case.method.value)
+    rows = jnp.concatenate([jnp.tile(observation, (ROWS, 1)), actions], axis=-1)
+    both = case.method.critics.values(case.before.critic, rows)
+    np.testing.assert_allclose(value(case.before, observation, actions), np.min(both, axis=0), rtol=1e-5)
+    alone = value(case.before, observation, actions[3:4])
+    np.testing.assert_allclose(alone, np.min(both, axis=0)[3:4], rtol=1e-4)
