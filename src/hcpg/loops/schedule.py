@@ -73,7 +73,10 @@ def _check_ranges(budget: Budget, horizon: int) -> None:
         (not budget.updates_per_step > 0, f"updates_per_step {budget.updates_per_step} must be positive"),
         (budget.batch_size < 1, f"batch_size {budget.batch_size} must be at least 1"),
         (budget.evaluations < 1, f"evaluations {budget.evaluations} must be at least 1"),
-        (budget.evaluation_episodes < 1, "evaluation_episodes must be at least 1"),
+        (
+            budget.evaluation_episodes < 1,
+            f"evaluation_episodes {budget.evaluation_episodes} must be at least 1",
+        ),
         (
             budget.warmup_steps < budget.batch_size,
             f"warmup_steps {budget.warmup_steps} must fill a batch of {budget.batch_size}",
