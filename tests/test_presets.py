@@ -1,0 +1,84 @@
+"""The named pairs and budgets: what they hold, and that a run's settings survive its config.json."""
+
+import json
+from dataclasses import fields, replace
+
+import pytest
+
+from hcpg import presets, registry
+from hcpg.presets import BUDGETS, PRESETS
+from hcpg.registry import UnknownNameError
+from hcpg.selection import Selector
+
+PAIRS = [(preset, budget) for preset in PRESETS for budget in BUDGETS]
+
+
+@pytest.mark.parametrize(("preset", "budget"), PAIRS)
+def test_settings_come_back_from_json(preset, budget):
+    chosen = presets.settings("point/carry", preset, budget)
+    assert presets.from_json(json.loads(json.dumps(chosen.as_json()))) == chosen
+
+
+def test_settings_other_than_the_presets_come_back_from_json():
+    chosen = presets.settings("point/carry")
+    changed = replace(
+        chosen,
+        learner=replace(chosen.learner, discount=0.9),
+        selector=replace(chosen.selector, translation=(1, 4), bounds=None, top_k=2),
+        budget=replace(chosen.budget, steps=123),
+    )
+    back = presets.from_json(json.loads(json.dumps(changed.as_json())))
+    assert back == changed
+    assert back.selector.translation == (1, 4)
+    assert back != chosen
+
+
+@pytest.mark.parametrize(("preset", "budget"), PAIRS)
+def test_a_preset_carries_its_names(preset, budget):
+    chosen = presets.settings("point/carry", preset, budget)
+    assert (chosen.task, chosen.preset, chosen.budget.name) == ("point/carry", preset, budget)
+    assert chosen.adapter == "paper"
+    assert chosen.evaluation_selector == chosen.selector
+
+
+@pytest.mark.parametrize("budget", BUDGETS)
+def test_presets_of_one_method_learn_alike_and_differ_in_the_selector_alone(budget):
+    learners = {}
+    for preset in PRESETS:
+        chosen = presets.settings("point/carry", preset, budget)
+        learners.setdefault(chosen.method, []).append(chosen.learner)
+    for alike in learners.values():
+        assert all(learner == alike[0] for learner in alike)
+    assert len(learners["sac_flow"]) >= 2
+
+
+def test_hcpg_flow_blends_four_and_sac_flow_takes_the_only_one():
+    assert PRESETS["hcpg_flow"].selector == Selector("hcpg", candidates=4)
+    assert PRESETS["sac_flow"].selector == Selector("first", candidates=1)
+
+
+def test_the_papers_budget_is_the_papers():
+    paper = BUDGETS["paper"]
+    assert (paper.steps, paper.warmup_steps, paper.batch_size) == (1_000_000, 50_000, 512)
+    assert (paper.environments, paper.updates_per_step) == (1, 1.0)
+    assert (paper.evaluations, paper.evaluation_episodes, paper.replay_capacity) == (25, 50, 1_000_000)
+
+
+def test_at_the_papers_budget_the_methods_own_defaults_hold():
+    for preset in PRESETS:
+        chosen = presets.settings("point/carry", preset, "paper")
+        assert chosen.learner == registry.method(chosen.method).Config()
+
+
+def test_overrides_name_real_settings_of_real_budgets():
+    for preset in PRESETS.values():
+        known = {each.name for each in fields(registry.method(preset.method).Config)}
+        assert set(preset.overrides) <= set(BUDGETS)
+        assert all(set(changes) <= known for changes in preset.overrides.values())
+
+
+def test_an_unknown_preset_or_budget_is_told_with_the_nearest():
+    with pytest.raises(UnknownNameError, match=r"no preset is named 'hcpg_flo'\. Did you mean 'hcpg_flow'\?"):
+        presets.settings("point/carry", "hcpg_flo")
+    with pytest.raises(UnknownNameError, match=r"no budget is named 'gpu'.* Known: .*cpu, .*paper"):
+        presets.settings("point/carry", "hcpg_flow", "gpu")
