@@ -64,6 +64,8 @@ def open_programs(environment: MutableMapping[str, str]) -> CompiledPrograms | N
     programs = CompiledPrograms(shared)
     environment["JAX_COMPILATION_CACHE_DIR"] = str(programs.path)
     environment.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
+    # XLA's own GPU caches would make the folder's name part of every entry's key: nothing would be found.
+    environment["JAX_PERSISTENT_CACHE_ENABLE_XLA_CACHES"] = "none"
     return programs
 
 
@@ -83,7 +85,7 @@ def _processor() -> str:
 
 def _is_writable(folder: Path) -> bool:
     nearest = next(each for each in (folder, *folder.parents) if each.exists())
-    return os.access(nearest, os.W_OK)
+    return nearest.is_dir() and os.access(nearest, os.W_OK)
 
 
 def _entries(folder: Path) -> list[Path]:

@@ -15,8 +15,8 @@ from hcpg.loops.population import Lane, View
 from hcpg.report.records import BARE
 from hcpg.report.statistics import wilson
 
-SHARE_PER_LINE = 0.1
-"""Plain lines: how much of a run passes between two lines about its progress."""
+PROGRESS_LINES = 10
+"""Plain lines about the progress of a whole run."""
 BAR_CELLS = 22
 _COLOURS = {"finished": "green", "stopped": "yellow", "diverged": "red", "failed": "red"}
 
@@ -107,7 +107,7 @@ class PlainView:
 
     def __init__(self, console: Console, progress: Mapping[Lane, Progress], heading: str) -> None:
         self._console, self._progress, self._heading = console, progress, heading
-        self._shown = dict.fromkeys(progress, 0.0)
+        self._shown = dict.fromkeys(progress, 0)
 
     def __enter__(self) -> View:
         self.say(self._heading)
@@ -124,11 +124,16 @@ class PlainView:
             self.say(f"{progress.name}: {message.facts['folder']}")
         elif message.kind == "evaluation":
             self.say(f"{progress.name}: {evaluation_text(progress.evaluation)}")
-        elif message.kind == "progress" and progress.step / lane.steps >= self._shown[lane] + SHARE_PER_LINE:
-            self._shown[lane] = progress.step / lane.steps
-            self.say(f"{progress.name}: {_progress_text(progress)}")
+        elif message.kind == "progress":
+            self._say_progress(progress)
         elif progress.end is message:
             self.say(f"{progress.name}: {end_text(message)}")
+
+    def _say_progress(self, progress: Progress) -> None:
+        passed = progress.step * PROGRESS_LINES // progress.lane.steps
+        if passed > self._shown[progress.lane]:
+            self._shown[progress.lane] = passed
+            self.say(f"{progress.name}: {_progress_text(progress)}")
 
     def say(self, text: str) -> None:
         """A line of its own, written at once."""
@@ -173,18 +178,18 @@ def _bar(progress: Progress) -> RenderableType:
     line.add_row(
         Text(progress.name, style="cyan"),
         ProgressBar(total=1.0, completed=share, width=BAR_CELLS),
-        Text(f"{share:4.0%}"),
-        Text(_clock_text(progress)),
+        Text(f"{100 * share:3.0f} %"),
+        Text(_clock_text(progress, "  ")),
     )
     return line
 
 
-def _clock_text(progress: Progress) -> str:
+def _clock_text(progress: Progress, separator: str) -> str:
     if progress.end is not None or not progress.row:
         return ""
     left_s = progress.time_left_s()
-    rate = f"{progress.row['steps_per_s']:,.0f} steps/s"
-    return rate if left_s is None else f"{_duration(left_s)} left  {rate}"
+    parts = [] if left_s is None else [f"{_duration(left_s)} left"]
+    return separator.join([*parts, f"{progress.row['steps_per_s']:,.0f} steps/s"])
 
 
 def _numbers(progress: Progress) -> list[RenderableType]:
@@ -207,7 +212,11 @@ def _numbers(progress: Progress) -> list[RenderableType]:
 
 
 def _training_text(row: Mapping[str, Any]) -> str:
-    return f"{row['train_success']:.0%} of the last 20 episodes succeeded" if "train_success" in row else ""
+    return (
+        f"{100 * row['train_success']:.0f} % of the last 20 episodes succeeded"
+        if "train_success" in row
+        else ""
+    )
 
 
 def _selector_text(row: Mapping[str, Any]) -> str:
@@ -215,14 +224,14 @@ def _selector_text(row: Mapping[str, Any]) -> str:
     if "selector_phase" not in row:
         return ""
     return (
-        f"{row['selector_phase']:.0%} in contact, "
+        f"{100 * row['selector_phase']:.0f} % in contact, "
         f"{row['selector_effective_candidates']:.1f} effective candidates, "
         f"spread {row['selector_spread']:.2f}, blend gap {row['selector_blend_gap']:.2f}"
     )
 
 
 def _progress_text(progress: Progress) -> str:
-    parts = [f"step {progress.step:,} of {progress.lane.steps:,}", _clock_text(progress)]
+    parts = [f"step {progress.step:,} of {progress.lane.steps:,}", _clock_text(progress, ", ")]
     parts += [_training_text(progress.row), _selector_text(progress.row)]
     return ", ".join(part for part in parts if part)
 

@@ -6,7 +6,7 @@ from typing import Any
 import equinox as eqx
 import jax
 from jax import numpy as jnp
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Key
 
 from hcpg.interfaces import Method
 from hcpg.loops.replay import Replay, sample
@@ -30,7 +30,7 @@ def compiled(method: Method, state_type: type, runs: int, updates: int, batch_si
     )
     fold = jax.vmap(jax.random.fold_in, in_axes=(0, None))
 
-    def learn(states: Any, replay: Replay, sampling: PRNGKeyArray, learning: PRNGKeyArray) -> tuple:
+    def learn(states: Any, replay: Replay, sampling: Key[Array, " R"], learning: Key[Array, " R"]) -> tuple:
         def body(states: Any, _: None) -> tuple[Any, dict[str, Array]]:
             batch = draw(replay.transitions, replay.inserted, fold(sampling, states.updates))
             return update(states, batch, fold(learning, states.updates))

@@ -43,7 +43,8 @@ def has_accelerator(environment: Mapping[str, str] = os.environ) -> bool:
 
 def one_core(environment: Mapping[str, str]) -> dict[str, str]:
     """The variables for a process that computes on one core; what the user has set wins."""
-    flags = f"{ONE_THREAD_XLA} {environment.get('XLA_FLAGS', '')}".strip()
+    given = environment.get("XLA_FLAGS", "")
+    flags = given if ONE_THREAD_XLA in given else f"{ONE_THREAD_XLA} {given}".strip()
     return {**{name: environment.get(name, "1") for name in _THREADS}, "XLA_FLAGS": flags}
 
 

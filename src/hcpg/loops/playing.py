@@ -1,5 +1,6 @@
 """Watch a trained run: episodes from the evaluation's start states, picture by picture."""
 
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -48,7 +49,9 @@ def play(trained: Trained, episodes: int, file: Path | None = None) -> Played:
         for start in range(episodes):
             yield from _episode(trained, policy, pool, start, successes)
 
-    with Pool(trained.settings.task, [EVALUATION_SEED], workers=1) as pool:
+    with Pool(trained.settings.task, [EVALUATION_SEED], workers=1) as pool, warnings.catch_warnings():
+        # The video writer starts ffmpeg by a fork that becomes ffmpeg at once: JAX's threads do not matter.
+        warnings.filterwarnings("ignore", r"os\.fork\(\) was called", RuntimeWarning)
         return Played(write_video(frames(), file, FRAMES_PER_S), successes)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from hcpg.loops import machine
 from hcpg.loops.child import STOP, Job, Message, log_of, work
@@ -33,6 +33,7 @@ class Lane(NamedTuple):
     """Environment steps of the whole run."""
 
 
+@runtime_checkable
 class View(Protocol):
     """Whoever shows the news to the user."""
 

@@ -37,10 +37,12 @@ def seed_of(folder: RunFolder) -> int:
 
 
 def extended(folder: RunFolder, steps: int | None) -> Settings:
-    """A run's own settings, with another number of steps if one is given."""
+    """A run's own settings, with another number of steps if one is given, evaluated as often per step."""
     config = folder.config()
+    budget = config["budget"]
     if steps is not None:
-        config["budget"]["steps"] = steps
+        evaluations = max(1, round(budget["evaluations"] * steps / budget["steps"]))
+        budget |= {"steps": steps, "evaluations": evaluations}
     return presets.from_json(config)
 
 

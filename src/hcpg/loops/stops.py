@@ -5,7 +5,7 @@ import signal
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any, Self
+from typing import Any
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -19,7 +19,7 @@ class Stops:
         """The first one's number."""
         self._before: dict[int, Any] = {}
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "Stops":
         for number in STOPPING:
             if signal.getsignal(number) is not signal.SIG_IGN:  # `nohup` ignores SIGHUP: let it
                 self._before[number] = signal.signal(number, self._count)
