@@ -9,7 +9,7 @@ import numpy as np
 from jax import numpy as jnp
 
 from hcpg import registry
-from hcpg.loops import acting, learning, replay, streams
+from hcpg.loops import acting, learning, memory, replay, streams
 from hcpg.loops.episodes import Episodes
 from hcpg.loops.evaluation import Evaluator
 from hcpg.loops.journal import Journal
@@ -94,11 +94,9 @@ class Trainer:
 
     def fresh(self, pool: Pool) -> Position:
         """The position at step 0."""
-        states, memory = self.empty()
+        states, ring = self.empty()
         starts = self._starts(np.zeros(pool.size, np.int64))
-        return Position(
-            0, states, memory, Episodes.begin(starts), pool.reset(starts), self._all_finite(), 0.0
-        )
+        return Position(0, states, ring, Episodes.begin(starts), pool.reset(starts), self._all_finite(), 0.0)
 
     def train(
         self, pool: Pool, position: Position, save: Callable[[Position], None], stop: Callable[[], bool]
@@ -119,6 +117,7 @@ class Trainer:
                 if self.schedule.logs(position.tick):
                     updates = int(position.states.updates)
                     self.journal.row(self.step(position), updates, position.wall_s)
+                    memory.hand_back()
                 self._evaluate(position, save)
         finally:
             self.evaluator.close()
@@ -160,10 +159,8 @@ class Trainer:
             arrival.next_observations,
             arrival.terminated.astype(np.float32),
         )
-        memory = self._insert(position.replay, jax.tree.map(self._per_run, brought))
-        return position._replace(
-            tick=tick, replay=memory, episodes=episodes, observations=arrival.observations
-        )
+        ring = self._insert(position.replay, jax.tree.map(self._per_run, brought))
+        return position._replace(tick=tick, replay=ring, episodes=episodes, observations=arrival.observations)
 
     def _choose(self, position: Position) -> np.ndarray:
         """Actions [R * E, A]."""

@@ -1,0 +1,10 @@
+"""Memory that was freed, handed back to the system."""
+
+import ctypes
+import platform
+
+
+def hand_back() -> None:
+    """Let go of what the allocator keeps, 0.4 GB after compiling a learner. Without glibc: nothing."""
+    if platform.libc_ver()[0] == "glibc":
+        ctypes.CDLL(None).malloc_trim(0)
