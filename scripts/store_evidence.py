@@ -51,7 +51,8 @@ def store(run: Record, folder: Path) -> None:
     shutil.copy(run.path / "config.json", folder)
     manifest = json.loads((run.path / "manifest.json").read_text())
     manifest["versions"] = {name: manifest["versions"].get(name) for name in PACKAGES}
-    del manifest["command"]  # it holds paths of the machine; README.md has the command
+    for private in ("command", "platform"):  # the first holds paths; README.md has the command
+        del manifest[private]
     (folder / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
     for table in TABLES:
         packed = gzip.compress((run.path / table).read_bytes(), mtime=0)
