@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hcpg import cli
 from hcpg.report.figures import learning_curves
-from hcpg.report.records import Record, find_runs, load_runs
+from hcpg.report.records import find_runs, load_runs
 from hcpg.report.tables import markdown
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -38,16 +38,13 @@ def main(options: list[str]) -> int:
     stem.with_name("table.md").write_text(table)
     picture, _ = learning_curves(groups, stem)
     sys.stdout.write(f"\n{table}\ncurves: {picture}\ntable:  {stem.with_name('table.md')}\n")
-    for group in groups:
-        show(group.runs[0])
-    return 0
-
-
-def show(run: Record) -> None:
-    """Say where a run lies, after a video of it: none is drawn without software OpenGL."""
-    sys.stdout.write(f"\n{run.preset}, seed {run.seed}: {run.path}\nvideo: ")
+    for run in (run for group in groups for run in group.runs):
+        sys.stdout.write(f"{run.preset}, seed {run.seed}: {run.path}\n")
+    shown = next(group.runs[0] for group in groups if group.preset == PRESETS[0])
+    sys.stdout.write(f"\nvideo of {shown.preset}, seed {shown.seed}: ")
     sys.stdout.flush()
-    cli.main(["play", str(run.path), "--episodes", "2"])
+    cli.main(["play", str(shown.path), "--episodes", "2"])  # without OpenGL it says what is missing
+    return 0
 
 
 if __name__ == "__main__":
