@@ -293,6 +293,7 @@ import os, signal, sys, time
 import numpy as np
 from hcpg.loops.pool import Pool
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background starts with it ignored
     pool = Pool("point/carry", [0, 1], workers=2)
     pool.reset(np.array([0, 1]))
     print("ready", flush=True)
