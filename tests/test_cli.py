@@ -44,10 +44,25 @@ def environment():
     return inherited | {"XDG_CACHE_HOME": str(CACHE)}
 
 
-def start(root, *options, **popen):
-    """The command in a process of its own, whose output can be read line by line."""
-    command = [*COMMAND, "train", "--out", str(root), *TINY, *options]
-    return subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True, **popen)
+def command(root, *options):
+    return [*COMMAND, "train", "--out", str(root), *TINY, *options]
+
+
+@pytest.fixture
+def start():
+    """Starts a command whose lines can be read while it runs; kills it if the test does not."""
+    started = []
+
+    def begin(root, *options):
+        opened = {"stdout": subprocess.PIPE, "text": True, "start_new_session": True}
+        started.append(subprocess.Popen(command(root, *options), env=environment(), **opened))
+        return started[-1]
+
+    yield begin
+    for process in started:
+        process.kill()
+        process.wait()
+        process.stdout.close()
 
 
 def folder_in(root):
@@ -65,9 +80,7 @@ def arrays(folder):
 def trained(tmp_path_factory):
     """One run that nobody disturbed: its folder and what the command printed."""
     root = tmp_path_factory.mktemp("trained")
-    process = start(root)
-    printed = process.communicate()[0]
-    assert process.returncode == 0
+    printed = subprocess.check_output(command(root), env=environment(), text=True)
     return folder_in(root), printed
 
 
@@ -175,7 +188,8 @@ def test_play_writes_a_video(trained, capsys, monkeypatch):
     count = f"import imageio_ffmpeg; print(*imageio_ffmpeg.count_frames_and_secs({str(file)!r}))"
     frames, seconds = map(float, subprocess.check_output([sys.executable, "-c", count]).split())
     # An episode has the first picture and one after each of its 60 steps but the last, which resets.
-    assert frames == 2 * 60 or "(success" in told or ", success" in told
+    failures = told.count("no success")
+    assert 60 * failures < frames <= 120 if failures < 2 else frames == 120
     assert seconds == pytest.approx(frames / 25, abs=0.05)
 
 
@@ -191,16 +205,15 @@ def processes_of(process):
     return [parent, *parent.children(recursive=True)]
 
 
-def test_killed_at_any_moment_it_goes_on_as_if_nothing_had_been(trained, tmp_path):
+def test_killed_at_any_moment_it_goes_on_as_if_nothing_had_been(trained, start, tmp_path):
     process = start(tmp_path)
     for line in process.stdout:
-        if "evaluation at step 240" in line:
+        if "evaluation at step 120" in line:
             break
     family = processes_of(process)
     assert len(family) >= 3  # the command, the run, its environments
     process.kill()
-    process.stdout.close()
-    process.wait()
+    process.communicate()
     _, alive = psutil.wait_procs(family[1:], timeout=120)
     assert alive == []
     folder = folder_in(tmp_path)
@@ -211,8 +224,8 @@ def test_killed_at_any_moment_it_goes_on_as_if_nothing_had_been(trained, tmp_pat
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_stop_saves_and_says_how_to_go_on(tmp_path, number, code):
-    process = start(tmp_path, "--steps", "400000", start_new_session=True)
+def test_a_stop_saves_and_says_how_to_go_on(start, tmp_path, number, code):
+    process = start(tmp_path, "--budget.steps", "8000")
     printed = ""
     while "steps/s" not in printed:  # the first line about progress
         line = process.stdout.readline()

@@ -62,7 +62,7 @@ def test_plain_lines_where_there_is_no_terminal(clock):
         shown.tell(LANE, EVALUATION)
         shown.tell(LANE, Message("diverged", 0, {"step": 304, "quantity": "reward"}))
     selector = "25 % in contact, 2.1 effective candidates, spread 0.50, blend gap 0.13"
-    training = "35 % of the last 20 episodes succeeded"
+    training = "35 % succeeded (last 20 episodes at most)"
     assert console.file.getvalue().splitlines() == [
         "heading",
         "hcpg_flow s0: runs/[a]",
@@ -93,7 +93,7 @@ def test_the_live_view_shows_bar_rates_and_selector(clock):
         progress.note(message)
     text = picture(progress, "stopping")
     assert "58 % 0:21 left  1,235 steps/s" in text
-    assert "training   65 % of the last 20 episodes succeeded" in text
+    assert "training   65 % succeeded (last 20 episodes at most)" in text
     assert "at step 300: hcpg 90 % [70, 97] (18/20), bare actor 45 % [26, 66] (9/20)" in text
     assert "25 % in contact, 2.1 effective candidates, spread 0.50, blend gap 0.13" in text
     assert "stopping" in text

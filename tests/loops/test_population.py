@@ -11,7 +11,7 @@ from hcpg.loops import population
 from hcpg.loops.child import Job
 from hcpg.loops.runs import RunFolder
 
-LONG = 400_000
+LONG = 20_000
 
 
 class Saboteur:

@@ -95,8 +95,9 @@ class LiveView:
 
     def _picture(self) -> RenderableType:
         parts: list[RenderableType] = [Text(self._heading, style="bold")]
+        width = max(len(progress.name) for progress in self._progress.values())
         for progress in self._progress.values():
-            parts += [Text(), _bar(progress), *_numbers(progress)]
+            parts += [Text(), _bar(progress, width), *_numbers(progress)]
         if self._words:
             parts += [Text(), Text(self._words, style="yellow")]
         return Group(*parts)
@@ -172,11 +173,11 @@ def end_text(end: Message) -> str:
     return f"{at}: {facts['quantity']} is not finite" if end.kind == "diverged" else at
 
 
-def _bar(progress: Progress) -> RenderableType:
+def _bar(progress: Progress, name_width: int) -> RenderableType:
     share = progress.step / progress.lane.steps
     line = Table.grid(padding=(0, 1))
     line.add_row(
-        Text(progress.name, style="cyan"),
+        Text(progress.name.ljust(name_width), style="cyan"),
         ProgressBar(total=1.0, completed=share, width=BAR_CELLS),
         Text(f"{100 * share:3.0f} %"),
         Text(_clock_text(progress, "  ")),
@@ -208,12 +209,12 @@ def _numbers(progress: Progress) -> list[RenderableType]:
         table.add_row(Text("  ended", style="dim"), Text(end_text(progress.end), _COLOURS[progress.end.kind]))
     elif not progress.row:
         table.add_row(Text("  starting: simulators and compiler", style="dim"))
-    return [table]
+    return [table] if table.rows else []
 
 
 def _training_text(row: Mapping[str, Any]) -> str:
     return (
-        f"{100 * row['train_success']:.0f} % of the last 20 episodes succeeded"
+        f"{100 * row['train_success']:.0f} % succeeded (last 20 episodes at most)"
         if "train_success" in row
         else ""
     )
