@@ -54,7 +54,7 @@ def filled_part(replay: Replay, run: int) -> dict[str, np.ndarray]:
     """One run's transitions as NumPy arrays, in ring order, without the part never written."""
     filled = min(int(replay.inserted), replay.transitions.rewards.shape[1])
     rings = replay.transitions._asdict()
-    return {name: np.asarray(ring[run, :filled]) for name, ring in rings.items()}
+    return {name: np.asarray(ring[run])[:filled] for name, ring in rings.items()}
 
 
 def refill(replay: Replay, parts: list[dict[str, np.ndarray]], inserted: int) -> Replay:
