@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import imageio_ffmpeg
+import jax
 import numpy as np
 import pytest
 
@@ -49,3 +50,9 @@ def test_what_makes_no_video_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingExtraError, match=r"imageio_ffmpeg is not .*'hcpg-flow\[video\]'"):
         write_video(grey_frames(2), tmp_path / "a.mp4", fps=10)
+
+
+def test_it_starts_its_encoder_in_silence_beside_jax(tmp_path):
+    jax.block_until_ready(jax.numpy.zeros(3) + 1)  # JAX's threads run, and it warns of forks from now on
+    frames = [np.zeros((16, 16, 3), np.uint8)] * 3
+    assert write_video(frames, tmp_path / "video.mp4", fps=10).stat().st_size > 0

@@ -1,8 +1,10 @@
 """Frames to an mp4 file that any player and browser shows."""
 
-from collections.abc import Iterable
+import warnings
+from collections.abc import Generator, Iterable
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +32,7 @@ def write_video(frames: Iterable[UInt8[np.ndarray, "H W 3"]], path: Path, fps: i
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.stem}.writing.mp4")
     writer = imageio_ffmpeg.write_frames(beside, (width, height), fps=fps, macro_block_size=2)
-    writer.send(None)
+    _start(writer)
     for number, frame in enumerate(chain([first], frames)):
         if frame.shape != first.shape:
             writer.close()
@@ -39,6 +41,13 @@ def write_video(frames: Iterable[UInt8[np.ndarray, "H W 3"]], path: Path, fps: i
         writer.send(np.ascontiguousarray(_even(frame)))
     writer.close()
     return beside.rename(path)
+
+
+def _start(writer: Generator[None, Any, None]) -> None:
+    """Start the encoder. JAX warns of any fork from its threads; this one only executes another program."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"os\.fork\(\) was called", RuntimeWarning)
+        writer.send(None)
 
 
 def _even(frame: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "evenH evenW 3"]:
