@@ -114,7 +114,7 @@ class Polyak(NamedTuple):
     """LayerNorm critics with exponentially averaged target networks.
 
     Their inputs are standardised by running moments, as batch renorm does for `CrossQ`: positions in metres
-    differ by centimetres where it matters, and a critic that sees them raw hardly tells actions apart.
+    differ by centimetres where it matters.
     """
 
     hidden_size: int
