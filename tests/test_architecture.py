@@ -101,7 +101,7 @@ def mapped_code() -> set[tuple[str, str]]:
 def test_every_import_contract_holds():
     settings, cache = str(ROOT / "pyproject.toml"), str(ROOT / ".cache/import_linter")
     # In a process of its own: the linter disables the loggers that other tests listen to.
-    code = f"from importlinter.cli import lint_imports as lint; "
+    code = "from importlinter.cli import lint_imports as lint; "
     code += f"raise SystemExit(lint(config_filename={settings!r}, "
     code += f"cache_dir={cache!r}, no_logo=True))"
     answer = subprocess.run(
