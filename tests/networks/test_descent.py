@@ -4,7 +4,7 @@ import numpy as np
 import optax
 from jax import numpy as jnp
 
-from hcpg.networks.descent import descend
+from hcpg.networks.descent import descend, follow
 
 
 def test_adams_first_step_is_the_learning_rate_against_the_sign():
@@ -20,3 +20,8 @@ def test_the_second_step_remembers_the_first():
         parameter, state = descend(optimizer, jnp.array(gradient), state, parameter)
     # m = (0.5 * 0.5 - 0.5) / (1 - 0.25) = -1 / 3, v = 1: back by a third of the first step
     np.testing.assert_allclose(parameter, -0.01 + 0.01 / 3, atol=1e-7)
+
+
+def test_a_follower_moves_by_its_rate_towards_what_it_follows():
+    found = follow({"a": jnp.array([1.0, 0.0])}, {"a": jnp.array([0.0, 2.0])}, 0.95)
+    np.testing.assert_allclose(found["a"], [0.05, 1.9], rtol=1e-6)

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from hcpg.networks.batch_renorm import BatchRenorm, Moments, observe, standardise
 from hcpg.networks.dense import Dense
+from hcpg.networks.descent import follow
 from hcpg.types import Batch
 
 Values = Float[Array, "N B"]
@@ -144,9 +145,7 @@ class Polyak(NamedTuple):
 
     def follow(self, state: CriticState) -> CriticState:
         """Targets moved by `target_rate` towards the online critics."""
-        rate = self.target_rate
-        target = jax.tree.map(lambda old, new: (1 - rate) * old + rate * new, state.target, state.networks)
-        return state._replace(target=target)
+        return state._replace(target=follow(state.target, state.networks, self.target_rate))
 
     def _evaluate(self, networks: PyTree, state: CriticState, inputs: Float[Array, "B I"]) -> Values:
         evaluate = jax.vmap(_LayerNetwork.__call__, in_axes=(0, None))

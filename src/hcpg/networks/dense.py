@@ -1,10 +1,15 @@
-"""A dense layer for batches, initialised as LeCun normal (the flow recipe's default)."""
+"""A dense layer for batches; LeCun normal (the flow recipe's default) unless told otherwise."""
+
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
 from jax import numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
+Initializer = Callable[[PRNGKeyArray, tuple[int, int]], Float[Array, "inputs outputs"]]
+LECUN_NORMAL: Initializer = jax.nn.initializers.lecun_normal()
+"""Variance 1 / inputs."""
 NARROW = 8
 """Outputs up to which `narrow_product` is worth it."""
 
@@ -16,10 +21,11 @@ class Dense(eqx.Module):
     bias: Float[Array, "*stack outputs"]
 
     @classmethod
-    def create(cls, key: PRNGKeyArray, inputs: int, outputs: int) -> "Dense":
-        """A layer with a LeCun-normal kernel (variance 1 / inputs) and zero bias."""
-        kernel = jax.nn.initializers.lecun_normal()(key, (inputs, outputs))
-        return cls(kernel, jnp.zeros(outputs))
+    def create(
+        cls, key: PRNGKeyArray, inputs: int, outputs: int, initializer: Initializer = LECUN_NORMAL
+    ) -> "Dense":
+        """A layer with a random kernel and zero bias."""
+        return cls(initializer(key, (inputs, outputs)), jnp.zeros(outputs))
 
     @classmethod
     def constant(cls, inputs: int, outputs: int, bias: float) -> "Dense":

@@ -1,5 +1,6 @@
-"""Gradient steps, the same for every network and every method."""
+"""Gradient steps and moving averages of parameters, the same for every network and every method."""
 
+import jax
 import optax
 from jaxtyping import PyTree
 
@@ -15,3 +16,8 @@ def descend(
     """The parameters after one step of the optimizer, and the optimizer's state after it."""
     step, optimizer_state = optimizer.update(gradient, optimizer_state)
     return optax.apply_updates(parameters, step), optimizer_state
+
+
+def follow(target: PyTree, online: PyTree, rate: float) -> PyTree:
+    """`target` moved towards `online`: (1 - rate) * target + rate * online."""
+    return jax.tree.map(lambda old, new: (1 - rate) * old + rate * new, target, online)
