@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from hcpg.types import Batch, Float, Scene, Spec, Step, Tensor, UInt8
+from hcpg.types import Batch, Float, Sampling, Scene, Spec, Step, Tensor, UInt8
 
 Metrics = Mapping[str, Tensor]
 ReadScene = Callable[[Float[Tensor, "*batch O"]], Scene]
@@ -20,6 +20,8 @@ class Method(Protocol):
 
     config: Any
     spec: Spec
+    sampling: ClassVar[Sampling]
+    """How its batches are drawn; `Sampling()` is uniform."""
 
     def init(self, key: Tensor) -> Any:
         """Everything that learning changes, fresh."""

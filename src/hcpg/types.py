@@ -63,6 +63,15 @@ class Batch(NamedTuple):
     """1 where the task itself ended (no bootstrap), 0 otherwise, also at a time limit."""
 
 
+class Sampling(NamedTuple):
+    """How a method wants its batches drawn from the replay."""
+
+    recent_share: float = 0.0
+    """Part of the batch, in [0, 1], that comes from the newest transitions alone."""
+    recent_window: int = 2048
+    """How many of the newest transitions that part is drawn from."""
+
+
 class Spec(NamedTuple):
     """Sizes that bind a method to a task."""
 

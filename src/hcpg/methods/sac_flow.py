@@ -1,7 +1,7 @@
 """SAC-Flow: maximum-entropy actor-critic whose actor is a flow."""
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import jax
 import optax
@@ -13,7 +13,7 @@ from hcpg.networks.critics import Critics, CriticState, CrossQ, Polyak, Target
 from hcpg.networks.descent import descend, rest
 from hcpg.networks.flow import FlowActor, Noise
 from hcpg.networks.velocity import FieldMoments
-from hcpg.types import Batch, Spec
+from hcpg.types import Batch, Sampling, Spec
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,7 @@ class SACFlow:
 
     config: Config
     spec: Spec
+    sampling: ClassVar[Sampling] = Sampling()
 
     @property
     def critics(self) -> Critics:
