@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax
 from jax import numpy as jnp
 
-from hcpg.types import Scene, Spec
+from hcpg.types import Sampling, Scene, Spec
 
 
 class Scalar(NamedTuple):
@@ -18,7 +18,7 @@ class Scalar(NamedTuple):
 class Follower:
     """Proposes `level + observation[0]` plus `noise` times uniform numbers; a value is minus the square."""
 
-    config = None
+    config, sampling = None, Sampling()
 
     def __init__(self, noise=0.0, spec=Spec(3, 4)):  # noqa: B008  a NamedTuple never changes
         self.noise, self.spec = noise, spec
@@ -46,7 +46,7 @@ class Follower:
 class Reacher:
     """Moves the point suite's tool straight to the object, by at most 0.02 m along each axis."""
 
-    config, spec = None, Spec(11, 4)
+    config, spec, sampling = None, Spec(11, 4), Sampling()
 
     def init(self, key):
         return Scalar(jnp.zeros(()), jnp.zeros((), jnp.int32))
