@@ -223,14 +223,20 @@ def test_killed_at_any_moment_it_goes_on_as_if_nothing_had_been(trained, start, 
     assert folder.rows("episodes") == trained[0].rows("episodes")
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_stop_saves_and_says_how_to_go_on(start, tmp_path, number, code):
-    process = start(tmp_path, "--budget.steps", "8000")
+def read_until(process, word):
+    """What the command printed up to the first line with that word."""
     printed = ""
-    while "steps/s" not in printed:  # the first line about progress
+    while word not in printed:
         line = process.stdout.readline()
         assert line, printed
         printed += line
+    return printed
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_stop_saves_and_says_how_to_go_on(start, tmp_path, number, code):
+    process = start(tmp_path, "--budget.steps", "8000")
+    printed = read_until(process, "steps/s")
     send = os.killpg if number == signal.SIGINT else os.kill  # a terminal sends Ctrl-C to the whole group
     send(process.pid, number)
     printed += process.communicate(timeout=120)[0]
@@ -240,3 +246,20 @@ def test_a_stop_saves_and_says_how_to_go_on(start, tmp_path, number, code):
     assert status["state"] == "stopped"
     assert arrays(folder)[0] == f"step_{status['step']:09d}"
     assert f"go on with: hcpg train --resume {folder.path}" in printed
+
+
+def test_a_second_ctrl_c_kills_at_once_and_leaves_nobody_behind(start, tmp_path):
+    process = start(tmp_path, "--budget.steps", "80000", "--budget.evaluations", "1")
+    read_until(process, "steps/s")
+    family = processes_of(process)
+    run = next(
+        each for each in family[1:] if each.cpu_times().user == max(p.cpu_times().user for p in family[1:])
+    )
+    run.suspend()  # it cannot obey the first request
+    os.killpg(process.pid, signal.SIGINT)
+    read_until(process, "once more kills at once")
+    os.killpg(process.pid, signal.SIGINT)
+    printed = process.communicate(timeout=60)[0]
+    assert process.returncode == 130
+    assert "SIGKILL" in printed
+    assert psutil.wait_procs(family, timeout=60)[1] == []

@@ -84,6 +84,20 @@ def test_another_configuration_is_refused(straight):
         sit(tiny_settings(discount=0.9), [folder])
 
 
+def test_an_error_before_the_first_step_is_in_the_status(tmp_path, monkeypatch):
+    settings = tiny_settings()
+    [folder] = sitting.create_folders(settings, [0], tmp_path)
+
+    def refuse(*_):
+        raise MemoryError("no room for the replay")
+
+    monkeypatch.setattr(sitting, "Trainer", refuse)
+    with pytest.raises(MemoryError):
+        sit(settings, [folder])
+    assert folder.status()["state"] == "failed"
+    assert folder.status()["error"] == "MemoryError: no room for the replay"
+
+
 def test_a_truncated_checkpoint_is_refused_with_the_cure(straight, tmp_path):
     whole, settings = straight
     [folder] = sitting.create_folders(settings, [1], tmp_path)

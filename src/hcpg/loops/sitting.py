@@ -1,7 +1,7 @@
 """One sitting: start or take up runs in this process, train until the end or a stop, say how it ended."""
 
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
@@ -64,19 +64,26 @@ def sit(
             stack.enter_context(folder.lock())
         facts = {"selector": settings.selector.rule, "adapter": settings.adapter}
         journal = Journal(folders, seeds, facts, notify)
-        trainer = Trainer(settings, seeds, journal, workers)
-        pool = stack.enter_context(trainer.pool())
-        try:
+        with _failure_noted(folders):
+            trainer = Trainer(settings, seeds, journal, workers)
+            pool = stack.enter_context(trainer.pool())
             resumes = any(any(folder.checkpoints.glob("step_*")) for folder in folders)
             position = restore(trainer, folders, pool) if resumes else trainer.fresh(pool)
             for folder in folders:
                 folder.set_config(settings.as_json())
                 folder.set_status("running", step=trainer.step(position))
             position = trainer.train(pool, position, Saver(trainer, folders), stop)
-        except Exception as error:
-            for folder in folders:
-                folder.set_status("failed", error=f"{type(error).__name__}: {error}")
-            raise
         done = position.tick >= trainer.schedule.ticks()
         journal.ended("finished" if done else "stopped", trainer.step(position))
         return journal.alive
+
+
+@contextmanager
+def _failure_noted(folders: list[RunFolder]) -> Iterator[None]:
+    """Whatever goes wrong inside is written into the runs' status, and goes on its way."""
+    try:
+        yield
+    except Exception as error:
+        for folder in folders:
+            folder.set_status("failed", error=f"{type(error).__name__}: {error}")
+        raise

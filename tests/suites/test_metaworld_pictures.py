@@ -1,0 +1,147 @@
+"""Pictures without a display, and the installer of the libraries that they need."""
+
+import ctypes
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hcpg import registry
+from hcpg.suites import metaworld as suite
+
+ROOT = Path(__file__).parents[2]
+INSTALLER = ROOT / "scripts/install_system_packages.sh"
+DRAWER = registry.task("metaworld/drawer-open")
+
+
+def can_draw():
+    try:
+        ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return False
+    return True
+
+
+def actions_of(seed, count):
+    return np.random.default_rng(seed).uniform(-1, 1, (count, 4)).astype(np.float32)
+
+
+def trajectory(environment, start, actions):
+    rows = [np.append(environment.reset(start), [0.0, 0.0])]
+    for action in actions:
+        step = environment.step(action)
+        rows.append(np.append(step.observation, [step.reward, step.success]))
+    return np.asarray(rows)
+
+
+@pytest.mark.skipif(not can_draw(), reason="needs libegl1")
+def test_pictures_need_no_display_are_upright_and_change_nothing(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    environment, actions = suite.SUITE.make(DRAWER, seed=0), actions_of(5, 30)
+    undrawn = trajectory(environment, 0, actions)
+    environment.reset(0)
+    before = environment.render()
+    drawn = [environment.step(action) for action in actions]
+    after = environment.render()
+    assert (before.shape, before.dtype) == ((480, 480, 3), np.uint8)
+    assert np.mean(before != after) > 0.01
+    assert np.array_equal(drawn[-1].observation, undrawn[-1, :39])
+    red, green, blue = np.moveaxis(before.astype(int), -1, 0)
+    arm = np.argwhere((red > 100) & (green < 60) & (blue < 60))
+    table = np.argwhere((red > green + 15) & (green > blue + 5) & (red < 160) & (green > 60))
+    assert len(arm) > 5000
+    assert len(table) > 5000
+    assert arm[:, 0].mean() + 50 < table[:, 0].mean()
+    environment.close()
+
+
+@pytest.mark.skipif(not can_draw(), reason="needs libegl1")
+def test_two_environments_draw_in_turn(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    one = suite.SUITE.make(DRAWER, seed=0)
+    other = suite.SUITE.make(registry.task("metaworld/button-press"), seed=0)
+    one.reset(0)
+    other.reset(1)
+    first, second = one.render(), other.render()
+    assert np.array_equal(one.render(), first)
+    assert np.array_equal(other.render(), second)
+    assert np.mean(first != second) > 0.01
+    one.close()
+    assert np.array_equal(other.render(), second)
+    other.close()
+
+
+@pytest.mark.skipif(not can_draw(), reason="needs libegl1")
+def test_a_viewer_that_nobody_closed_ends_in_silence():
+    code = (
+        "from hcpg import registry; task = registry.task('metaworld/drawer-open')\n"
+        "environment = registry.suite('metaworld').make(task, 0); environment.reset(0)\n"
+        "print(environment.render().shape)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "MUJOCO_GL": "egl"}
+    told = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert (told.stdout, told.stderr) == ("(480, 480, 3)\n", "")
+
+
+def test_a_missing_library_stops_pictures_with_its_cure_and_nothing_else(monkeypatch):
+    monkeypatch.setitem(suite.OPENGL_LIBRARIES, "egl", "libNoSuchLibrary.so.1")
+    monkeypatch.setenv("MUJOCO_GL", "")
+    environment = suite.SUITE.make(DRAWER, seed=0)
+    environment.reset(0)
+    assert environment.step(np.zeros(4, np.float32)).reward >= 0.0
+    with pytest.raises(suite.RenderingError, match="libNoSuchLibrary") as stopped:
+        environment.render()
+    assert "MUJOCO_GL=egl" in str(stopped.value)
+    assert "scripts/install_system_packages.sh" in str(stopped.value)
+    assert "sudo apt-get install libegl1 libgl1-mesa-dri" in str(stopped.value)
+    environment.close()
+
+
+def test_the_users_own_choice_of_library_is_kept_and_checked_first(monkeypatch):
+    monkeypatch.setitem(suite.OPENGL_LIBRARIES, "osmesa", "libNoSuchLibrary.so.1")
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    with pytest.raises(suite.RenderingError, match="MUJOCO_GL=osmesa"):
+        suite.SUITE.make(DRAWER, seed=0)
+    assert os.environ["MUJOCO_GL"] == "osmesa"
+
+
+def install(folder, installed, *, root):
+    """Run the installer with stand-ins for what it calls; gives the process and the calls of apt-get."""
+    answers = {
+        "dpkg-query": f'case " {installed} " in *" $3 "*) echo installed;; *) exit 1;; esac',
+        "apt-get": f'echo "$*" >>{folder}/calls',
+        "id": f"echo {0 if root else 1000}",
+        "env": 'shift; exec "$@"',
+    }
+    for name, body in answers.items():
+        (folder / name).write_text(f"#!/bin/bash\n{body}\n")
+        (folder / name).chmod(0o755)
+    told = subprocess.run(
+        ["/bin/bash", INSTALLER], env={"PATH": str(folder)}, capture_output=True, text=True, check=False
+    )
+    calls = folder / "calls"
+    return told, calls.read_text().splitlines() if calls.exists() else []
+
+
+def test_the_installer_installs_what_is_missing_and_then_nothing(tmp_path):
+    told, calls = install(tmp_path, "libegl1", root=True)
+    assert told.returncode == 0
+    assert calls == ["update -qq", "install -y -qq --no-install-recommends libgl1-mesa-dri"]
+    assert "Installing libgl1-mesa-dri" in told.stdout
+    told, again = install(tmp_path, suite.OPENGL_PACKAGES, root=True)
+    assert told.returncode == 0
+    assert "Nothing to install" in told.stdout
+    assert again == calls
+
+
+def test_the_installer_says_what_it_cannot_do_without_root(tmp_path):
+    told, calls = install(tmp_path, "", root=False)
+    assert told.returncode == 1
+    assert "as root: apt-get install libegl1 libgl1-mesa-dri" in told.stderr
+    assert calls == []
