@@ -8,10 +8,8 @@ from jax import numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from hcpg.networks.dense import Dense
+from hcpg.networks.gaussian import LOG_SQRT_TWO_PI, bounded_log_deviation, tanh_log_slope
 from hcpg.networks.velocity import FieldMoments, GatedVelocity
-
-LOG_DEVIATION_RANGE = (-5.0, 2.0)
-LOG_SQRT_TWO_PI = 0.9189385332046727
 
 
 class Noise(NamedTuple):
@@ -61,8 +59,7 @@ class Deviation(eqx.Module):
     def log(self, observations: Float[Array, "*batch O"]) -> Float[Array, "*batch A"]:
         """Logarithm of the deviation, within [-5, 2]."""
         hidden = jax.nn.relu(self.second(jax.nn.relu(self.first(observations))))
-        low, high = LOG_DEVIATION_RANGE
-        return low + 0.5 * (high - low) * (jnp.tanh(self.last(hidden)) + 1)
+        return bounded_log_deviation(self.last(hidden))
 
 
 class FlowActor(eqx.Module):
@@ -144,12 +141,3 @@ def path_log_prob(
     squares = jnp.square(noise.start) + jnp.square(noise.steps).sum(axis=0)
     gaussian = -0.5 * squares - flow_steps * log_deviation - (flow_steps + 1) * LOG_SQRT_TWO_PI
     return (gaussian - tanh_log_slope(end)).sum(axis=-1)
-
-
-def tanh_log_slope(x: Float[Array, "*batch A"], half_range: float = 1.0) -> Float[Array, "*batch A"]:
-    """Logarithm of the slope of `half_range * tanh(x)`, floored at log(1e-6).
-
-    The slope is a product of sigmoids, since 1 - tanh(x)^2 has no digits left in float32 from |x| = 5 on.
-    """
-    slope = 4 * jax.nn.sigmoid(2 * x) * jax.nn.sigmoid(-2 * x)
-    return jnp.log(half_range * slope + 1e-6)
