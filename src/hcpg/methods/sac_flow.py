@@ -12,6 +12,7 @@ from hcpg.interfaces import Metrics
 from hcpg.networks.critics import Critics, CriticState, CrossQ, Polyak, Target
 from hcpg.networks.descent import descend, rest
 from hcpg.networks.flow import FlowActor, Noise
+from hcpg.networks.maximum_entropy import improve_critics, improve_temperature, pessimistic_values
 from hcpg.networks.velocity import FieldMoments
 from hcpg.types import Batch, Sampling, Spec
 
@@ -111,9 +112,7 @@ class SACFlow:
         self, state: State, observation: Float[Array, " O"], actions: Float[Array, "K A"]
     ) -> Float[Array, " K"]:
         """The smaller of the two critics' values."""
-        repeated = jnp.broadcast_to(observation, (actions.shape[0], observation.size))
-        inputs = jnp.concatenate([repeated, actions], axis=-1)
-        return self.critics.values(state.critic, inputs).min(axis=0)
+        return pessimistic_values(self.critics, state.critic, observation, actions)
 
     def update(self, state: State, batch: Batch, key: PRNGKeyArray) -> tuple[State, Metrics]:
         """Improve the critics; every `policy_delay`-th time the actor and the temperature too."""
@@ -135,14 +134,11 @@ class SACFlow:
         path = state.actor.infer(state.actor_moments, batch.next_observations, noise)
         bonus = -jnp.exp(state.log_temperature) * path.log_prob
         following = Target(path.actions, bonus, self.config.discount)
-        (loss, (critic, values)), gradient = jax.value_and_grad(self.critics.loss, has_aux=True)(
-            state.critic.networks, state.critic, batch, following
-        )
         adam = self._adam(self.config.critic_learning_rate)
-        networks, optimizer = descend(adam, gradient, state.critic_optimizer, critic.networks)
-        critic = critic._replace(networks=networks)
-        state = state._replace(critic=self.critics.follow(critic), critic_optimizer=optimizer)
-        return state, {"critic_loss": loss, "value": values.mean()}
+        critic, optimizer, metrics = improve_critics(
+            self.critics, state.critic, batch, following, adam, state.critic_optimizer
+        )
+        return state._replace(critic=critic, critic_optimizer=optimizer), metrics
 
     def _improve_policy(
         self, state: State, batch: Batch, key: PRNGKeyArray
@@ -154,10 +150,9 @@ class SACFlow:
         adam = self._adam(self.config.actor_learning_rate)
         actor, actor_optimizer = descend(adam, gradient, state.actor_optimizer, state.actor)
         surplus = entropy - self.config.target_entropy
-        slope = jnp.exp(state.log_temperature) * surplus
         adam = self._adam(self.config.temperature_learning_rate)
-        log_temperature, temperature_optimizer = descend(
-            adam, slope, state.temperature_optimizer, state.log_temperature
+        log_temperature, temperature_optimizer = improve_temperature(
+            state.log_temperature, surplus, adam, state.temperature_optimizer
         )
         state = state._replace(
             actor=actor,
@@ -173,8 +168,7 @@ class SACFlow:
         self, actor: FlowActor, state: State, observations: Float[Array, "B O"], noise: Noise
     ) -> tuple[Float[Array, ""], tuple[Float[Array, ""], FieldMoments]]:
         path, moments = actor.train(state.actor_moments, observations, noise)
-        inputs = jnp.concatenate([observations, path.actions], axis=-1)
-        values = self.critics.values(state.critic, inputs).min(axis=0)
+        values = pessimistic_values(self.critics, state.critic, observations, path.actions)
         loss = (jnp.exp(state.log_temperature) * path.log_prob - values).mean()
         return loss, (-path.log_prob.mean(), moments)
 
