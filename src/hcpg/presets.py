@@ -79,6 +79,7 @@ CPU_SAC_FLOW = {
 PRESETS = {
     "hcpg_flow": Preset("sac_flow", Selector("hcpg", candidates=4), {"cpu": CPU_SAC_FLOW}),
     "sac_flow": Preset("sac_flow", Selector("first", candidates=1), {"cpu": CPU_SAC_FLOW}),
+    "flowrl": Preset("flowrl", Selector("first", candidates=1), {"cpu": {"hidden_size": 256}}),
 }
 
 BUDGETS = {

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from probes import DISCOUNT, SPEC, Probe, learned, proposals, values
 
+from hcpg.methods import flowrl
 from hcpg.methods.sac_flow import Config, SACFlow
 
 
@@ -28,6 +29,12 @@ def sac_flow(critic):
 METHODS = {
     "sac_flow crossq": sac_flow("crossq"),
     "sac_flow polyak": sac_flow("polyak"),
+    "flowrl": flowrl.FlowRL(
+        flowrl.Config(
+            hidden_size=16, discount=DISCOUNT, learning_rate=3e-3, policy_delay=1, anchor_weight=1e-3
+        ),
+        SPEC,
+    ),
 }
 each_method = pytest.mark.parametrize("name", METHODS)
 

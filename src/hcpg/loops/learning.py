@@ -1,6 +1,7 @@
 """Updates of all runs in one jitted call: sample, learn, repeat; buffers are donated."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -25,9 +26,8 @@ def compiled(method: Method, state_type: type, runs: int, updates: int, batch_si
     axes = axes_of(state_type)
     update = over_runs(method.update, runs, (axes, 0, 0), (axes, 0))
     finite = over_runs(is_finite, runs, (axes,))
-    draw = over_runs(
-        lambda transitions, inserted, key: sample(transitions, inserted, key, batch_size), runs, (0, None, 0)
-    )
+    draw_one = partial(sample, batch_size=batch_size, sampling=method.sampling)
+    draw = over_runs(draw_one, runs, (0, None, 0))
     fold = jax.vmap(jax.random.fold_in, in_axes=(0, None))
 
     def learn(states: Any, replay: Replay, sampling: Key[Array, " R"], learning: Key[Array, " R"]) -> tuple:

@@ -7,7 +7,7 @@ import numpy as np
 from jax import numpy as jnp
 from jaxtyping import Array, Int, PRNGKeyArray
 
-from hcpg.types import Batch, Spec
+from hcpg.types import Batch, Sampling, Spec
 
 
 class Replay(NamedTuple):
@@ -43,10 +43,25 @@ def insert(replay: Replay, arrivals: Batch) -> Replay:
     return Replay(transitions, replay.inserted + brought)
 
 
-def sample(transitions: Batch, inserted: Int[Array, ""], key: PRNGKeyArray, batch_size: int) -> Batch:
-    """`batch_size` transitions of one run, uniform with replacement over what is filled."""
-    filled = jnp.minimum(inserted, transitions.rewards.shape[0])
-    rows = jax.random.randint(key, (batch_size,), 0, filled)
+def sample(
+    transitions: Batch, inserted: Int[Array, ""], key: PRNGKeyArray, batch_size: int, sampling: Sampling
+) -> Batch:
+    """`batch_size` transitions of one run, with replacement; those from the newest alone come last.
+
+    A row drawn twice leaves the mean gradient as it is. It is rare, too: of 51 rows from the newest 2048,
+    0.6 repeat another one on average; of the other 205, 4.1 in a ring of 5000 and 0.1 in one of 200000.
+    """
+    capacity = transitions.rewards.shape[0]
+    filled = jnp.minimum(inserted, capacity)
+    recent = round(sampling.recent_share * batch_size)
+    if recent == 0:
+        rows = jax.random.randint(key, (batch_size,), 0, filled)
+    else:
+        of_all, of_recent = jax.random.split(key)
+        window = jnp.minimum(filled, sampling.recent_window)
+        ages = jax.random.randint(of_recent, (recent,), 1, window + 1)
+        uniform = jax.random.randint(of_all, (batch_size - recent,), 0, filled)
+        rows = jnp.concatenate([uniform, (inserted - ages) % capacity])
     return jax.tree.map(lambda ring: ring[rows], transitions)
 
 
