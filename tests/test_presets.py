@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 import pytest
 
 from hcpg import presets, registry
-from hcpg.presets import BUDGETS, PRESETS
+from hcpg.presets import ARMS, BUDGETS, PRESETS
 from hcpg.registry import UnknownNameError
 from hcpg.selection import Selector
 
@@ -38,18 +38,25 @@ def test_a_preset_carries_its_names(preset, budget):
     chosen = presets.settings("point/carry", preset, budget)
     assert (chosen.task, chosen.preset, chosen.budget.name) == ("point/carry", preset, budget)
     assert chosen.adapter == "paper"
-    assert chosen.evaluation_selector == chosen.selector
+    assert chosen.selector == PRESETS[preset].selector
+
+
+def test_only_the_arms_that_say_so_evaluate_with_another_selector():
+    other = {
+        name: (chosen.selector.rule, chosen.evaluation_selector.rule)
+        for name in PRESETS
+        if (chosen := presets.settings("point/carry", name)).evaluation_selector != chosen.selector
+    }
+    assert other == {"hcpg_training_only": ("hcpg", "first"), "hcpg_evaluation_only": ("first", "hcpg")}
 
 
 @pytest.mark.parametrize("budget", BUDGETS)
-def test_presets_of_one_method_learn_alike_and_differ_in_the_selector_alone(budget):
-    learners = {}
-    for preset in PRESETS:
+def test_the_arms_learn_as_sac_flow_does_and_differ_in_the_selector_alone(budget):
+    plain = presets.settings("point/carry", "sac_flow", budget)
+    for preset in ("hcpg_flow", *ARMS):
         chosen = presets.settings("point/carry", preset, budget)
-        learners.setdefault(chosen.method, []).append(chosen.learner)
-    for alike in learners.values():
-        assert all(learner == alike[0] for learner in alike)
-    assert len(learners["sac_flow"]) >= 2
+        assert (chosen.method, chosen.learner) == ("sac_flow", plain.learner)
+        assert (chosen.selector, chosen.evaluation_selector) != (plain.selector, plain.evaluation_selector)
 
 
 def test_hcpg_flow_blends_four_and_sac_flow_takes_the_only_one():
@@ -65,7 +72,7 @@ def test_the_papers_budget_is_the_papers():
 
 
 def test_at_the_papers_budget_the_methods_own_defaults_hold():
-    for preset in PRESETS:
+    for preset in ("hcpg_flow", "sac_flow", "sac", "flowrl"):
         chosen = presets.settings("point/carry", preset, "paper")
         assert chosen.learner == registry.method(chosen.method).Config()
 

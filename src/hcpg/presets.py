@@ -65,6 +65,8 @@ class Preset:
     selector: Selector
     overrides: dict[str, dict[str, Any]] = field(default_factory=dict)
     """The method's settings by budget name, where they differ from its defaults."""
+    evaluation_selector: Selector | None = None
+    """The selector at evaluation, where it is another one."""
 
 
 # Chosen by measurement, see docs/decisions.md: with few updates the actor must learn faster than in the
@@ -76,10 +78,51 @@ CPU_SAC_FLOW = {
     "target_entropy": 24.0,
 }
 
+# SAC-Flow's recipe but for the actor (and the target entropy, which is the action's here, not a path's).
+SAC_CROSSQ = {
+    "critic": "crossq",
+    "critic_hidden_size": 1024,
+    "critic_learning_rate": 1e-3,
+    "temperature_learning_rate": 1e-3,
+    "momentum": 0.5,
+    "policy_delay": 3,
+    "initial_temperature": 0.2,
+}
+CPU_SAC_CROSSQ = {**SAC_CROSSQ, "critic_hidden_size": 256, "actor_learning_rate": 1e-3}
+
+HCPG, ALONE = Selector("hcpg", candidates=4), Selector("first", candidates=1)
+
+
+def _arm(selector: Selector, evaluation_selector: Selector | None = None) -> Preset:
+    """SAC-Flow with another selector: a control that takes HCPG apart."""
+    return Preset("sac_flow", selector, {"cpu": CPU_SAC_FLOW}, evaluation_selector)
+
+
+ARMS = {
+    "hcpg_k2": _arm(Selector("hcpg", candidates=2)),
+    "hcpg_k8": _arm(Selector("hcpg", candidates=8)),
+    "hcpg_training_only": _arm(HCPG, ALONE),
+    "hcpg_evaluation_only": _arm(ALONE, HCPG),
+    "hcpg_random_directions": _arm(Selector("hcpg", direction="random", candidates=4)),
+    "hcpg_opposed": _arm(Selector("hcpg", direction="opposed", candidates=4)),
+    "q_guided": _arm(Selector("value", candidates=4)),
+    "q_guided_soft": _arm(Selector("value_soft", candidates=4)),
+    "argmax": _arm(Selector("argmax", candidates=4)),
+    "mean": _arm(Selector("mean", candidates=4)),
+    "random": _arm(Selector("random", candidates=4)),
+    "permuted": _arm(Selector("permuted", candidates=4)),
+}
+"""Q-guided selection and HCPG's ablations. Source: paper, the candidate-count ablation; the rest is ours."""
+
 PRESETS = {
-    "hcpg_flow": Preset("sac_flow", Selector("hcpg", candidates=4), {"cpu": CPU_SAC_FLOW}),
-    "sac_flow": Preset("sac_flow", Selector("first", candidates=1), {"cpu": CPU_SAC_FLOW}),
-    "flowrl": Preset("flowrl", Selector("first", candidates=1), {"cpu": {"hidden_size": 256}}),
+    "hcpg_flow": _arm(HCPG),
+    "sac_flow": _arm(ALONE),
+    **ARMS,
+    "flowrl": Preset("flowrl", ALONE, {"cpu": {"hidden_size": 256}}),
+    "sac": Preset("sac", Selector("first", candidates=1)),
+    "sac_crossq": Preset(
+        "sac", Selector("first", candidates=1), {"paper": SAC_CROSSQ, "cpu": CPU_SAC_CROSSQ}
+    ),
 }
 
 BUDGETS = {
@@ -122,7 +165,7 @@ def settings(task: str, preset: str = "hcpg_flow", budget: str = "cpu") -> Setti
         method=chosen.method,
         learner=replace(config, **chosen.overrides.get(budget, {})),
         selector=chosen.selector,
-        evaluation_selector=chosen.selector,
+        evaluation_selector=chosen.evaluation_selector or chosen.selector,
         adapter="paper",
         budget=amount,
     )

@@ -43,6 +43,7 @@ def check(proposals, action, seen, bounds=(-np.inf, np.inf)):
 SELECTORS = st.builds(
     Selector,
     rule=st.sampled_from(list(RULES)),
+    direction=st.sampled_from(["scene", "opposed", "random"]),
     temperature=st.sampled_from([1e-6, 0.7, 1e6]),
     action_penalty=st.sampled_from([0.0, 0.05, 1e6]),
     epsilon=st.sampled_from([1e-30, 1e-6, 1.0]),

@@ -68,8 +68,12 @@ class TestRefused:
         ("rule", "missing"), [("random", "noise"), ("permuted", "noise"), ("value", "values")]
     )
     def test_a_rule_without_what_it_needs(self, rule, missing):
-        with pytest.raises(ValueError, match=rf"rule '{rule}' needs {missing}: give {missing}=\[..., K\]"):
+        with pytest.raises(ValueError, match=rf"rule '{rule}' .* needs {missing}: give {missing}=\[..., K\]"):
             select(PROPOSALS, scene_of(3), rule)
+
+    def test_a_random_direction_without_lots(self):
+        with pytest.raises(ValueError, match=r"direction 'random' needs noise: give noise=\[..., K\]"):
+            select(PROPOSALS, scene_of(3), Selector(direction="random"))
 
     def test_values_of_other_candidates(self):
         with pytest.raises(ValueError, match=r"values has shape \(3,\); .* call for \(4,\)"):

@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 from hcpg.selection import RULES, Scene, Selector, select
+from hcpg.selection.progress import random_direction
 
 
 def everything(generator, *batch, count=4, size=7):
@@ -144,3 +146,33 @@ def test_after_contact_the_task_decides(flagged_scene):
     grasped = flagged_scene._replace(contact=np.array(1.0))
     assert np.argmax(select(proposals, flagged_scene)[1].weights) == 0
     assert np.argmax(select(proposals, grasped)[1].weights) == 1
+
+
+def test_opposed_scores_are_those_of_the_scene_turned_round(generator):
+    proposals, scene, _ = everything(generator, 20)
+    turned = scene._replace(approach=-scene.approach, task=-scene.task)
+    _, seen = select(proposals, scene, Selector(direction="opposed"))
+    _, expected = select(proposals, turned)
+    assert seen.scores.tolist() == expected.scores.tolist()
+    assert seen.phase.tolist() == expected.phase.tolist()
+
+
+def test_random_directions_know_nothing_of_the_scene_but_its_phase(generator):
+    proposals, scene, extras = everything(generator, 20)
+    other = everything(generator, 20)[1]._replace(contact=scene.contact)
+    rule = Selector(direction="random", action_penalty=0.0)
+    action, seen = select(proposals, scene, rule, noise=extras["noise"])
+    assert action.tolist() == select(proposals, other, rule, noise=extras["noise"])[0].tolist()
+    assert seen.phase.tolist() == scene.contact.tolist()
+    # Lots .5 and .25: height 0, a quarter of the way round, so the score is the step along +y.
+    one = Scene(*(part[0] for part in scene))
+    _, along_y = select(proposals[0], one, rule, noise=np.array([0.5, 0.9, 0.9, 0.25]))
+    assert along_y.scores == pytest.approx(proposals[0, :, 1], abs=1e-12)
+
+
+def test_random_directions_are_uniform_over_the_sphere(generator):
+    found = random_direction(generator.uniform(size=(20_000, 4)))
+    assert np.linalg.norm(found, axis=1) == pytest.approx(np.ones(20_000))
+    assert abs(found.mean(axis=0)).max() < 4 / (3 * 20_000) ** 0.5  # four standard errors
+    # Each coordinate of such a vector is uniform on [-1, 1].
+    assert all(kstest(column, "uniform", (-1, 2)).pvalue > 1e-3 for column in found.T)

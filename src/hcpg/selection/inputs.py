@@ -68,7 +68,8 @@ def _check_proposals(proposals: Tensor, selector: Selector) -> None:
 
 def _check_given(name: str, part: Tensor | None, needed: bool, selector: Selector) -> None:
     if needed and part is None:
-        raise ValueError(f"rule {selector.rule!r} needs {name}: give {name}=[..., K], one per proposal")
+        asks = f"rule {selector.rule!r} with direction {selector.direction!r}"
+        raise ValueError(f"{asks} needs {name}: give {name}=[..., K], one per proposal")
 
 
 def _array(name: str, part: Tensor | None, shape: tuple[int, ...], proposals: Tensor) -> Tensor | None:

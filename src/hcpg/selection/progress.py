@@ -3,6 +3,8 @@
 Every function takes any finite input, however extreme, without overflow.
 """
 
+from math import pi
+
 from hcpg.selection.arrays import bounded, length, namespace
 from hcpg.types import Float, Tensor
 
@@ -23,6 +25,15 @@ def directional_progress(
     scaled = target / unit
     direction = scaled / xp.clip(length(scaled), 1.0, None)[..., None]
     return xp.sum(translations * direction[..., None, :], axis=-1)
+
+
+def random_direction(lots: Float[Tensor, "*batch K"]) -> Float[Tensor, "*batch 3"]:
+    """A unit vector: uniform over the sphere, given two or more independent lots, uniform in [0, 1]."""
+    xp = namespace(lots)
+    height = 2.0 * xp.clip(lots[..., 0], 0.0, 1.0) - 1.0
+    around = 2.0 * pi * xp.clip(lots[..., -1], 0.0, 1.0)
+    radius = xp.sqrt(1.0 - height**2)
+    return xp.stack([radius * xp.cos(around), radius * xp.sin(around), height], axis=-1)
 
 
 def contact_phase(

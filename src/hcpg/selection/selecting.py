@@ -5,7 +5,7 @@ from typing import NamedTuple
 from hcpg.selection.arrays import bounded, length, namespace
 from hcpg.selection.blending import blend
 from hcpg.selection.inputs import Inputs, gather
-from hcpg.selection.progress import contact_phase, score
+from hcpg.selection.progress import contact_phase, random_direction, score
 from hcpg.selection.selectors import RULES, Evidence, RuleName, Selector
 from hcpg.types import Bool, Float, Scene, Tensor
 
@@ -71,7 +71,17 @@ def select(
 
 def _scores(inputs: Inputs, phase: Tensor, selector: Selector) -> Tensor:
     moves = inputs.proposals[..., slice(*selector.translation)]
-    return score(moves, inputs.approach, inputs.task, phase, selector.action_penalty, selector.epsilon)
+    approach, task = _targets(inputs, selector)
+    return score(moves, approach, task, phase, selector.action_penalty, selector.epsilon)
+
+
+def _targets(inputs: Inputs, selector: Selector) -> tuple[Tensor, Tensor]:
+    """The scene's two vectors, or what a control puts in their place; the phase keeps the scene's."""
+    if selector.direction == "random":
+        anywhere = random_direction(inputs.noise)
+        return anywhere, anywhere
+    sign = -1.0 if selector.direction == "opposed" else 1.0
+    return sign * inputs.approach, sign * inputs.task
 
 
 def _usable(inputs: Inputs, scores: Tensor) -> Bool[Tensor, "*batch K"]:

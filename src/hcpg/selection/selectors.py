@@ -3,13 +3,14 @@
 import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from hcpg.selection.arrays import namespace, ranks
 from hcpg.selection.blending import equal_weights, soft_weights, standardise
 from hcpg.types import Bool, Float, Tensor
 
 RuleName = Literal["hcpg", "first", "mean", "random", "argmax", "permuted", "value", "value_soft"]
+Direction = Literal["scene", "opposed", "random"]
 
 # Limits within which no setting can overflow in float32; every sensible value lies far inside.
 _LIMITS = {
@@ -27,6 +28,8 @@ class Selector:
 
     rule: RuleName = "hcpg"
     """Which of `RULES` weighs the proposals."""
+    direction: Direction = "scene"
+    """Where progress points: to the scene's targets, away from them, or anywhere (a new draw each time)."""
     candidates: int = 4
     """How many proposals (K) a loop asks for; `select` itself takes however many it is given."""
     temperature: float = 0.7
@@ -54,6 +57,9 @@ class Selector:
             near = difflib.get_close_matches(str(self.rule), RULES, n=1)
             guess = f" Did you mean {near[0]!r}?" if near else ""
             raise ValueError(f"no selection rule is named {self.rule!r}.{guess} Known: {', '.join(RULES)}.")
+        if self.direction not in get_args(Direction):
+            known = ", ".join(get_args(Direction))
+            raise ValueError(f"no direction is named {self.direction!r}. Known: {known}.")
         for name, (low, high) in _LIMITS.items():
             if not low <= getattr(self, name) <= high:
                 raise ValueError(f"{name} is {getattr(self, name)!r}; it must lie in [{low:g}, {high:g}]")
@@ -67,8 +73,8 @@ class Selector:
 
     @property
     def needs_noise(self) -> bool:
-        """Whether the rule draws lots, so that `select` must be given `noise`."""
-        return RULES[self.rule].needs_noise
+        """Whether the rule or the direction draws lots, so that `select` must be given `noise`."""
+        return RULES[self.rule].needs_noise or self.direction == "random"
 
     @property
     def needs_values(self) -> bool:
