@@ -46,7 +46,10 @@ class Settings:
     selector: Selector
     """What chooses among the proposals while training data is collected."""
     evaluation_selector: Selector
-    """What chooses among the proposals at evaluation; the bare actor is evaluated beside it."""
+    """What chooses among the proposals at evaluation; the bare actor is evaluated beside it.
+
+    With one candidate there is nothing to choose, and the bare actor is all that is evaluated.
+    """
     adapter: str
     """Family of the task's scene reader: `paper` or `contact`; never mixed in one table."""
     budget: Budget
@@ -119,6 +122,7 @@ PRESETS = {
     "sac_flow": _arm(ALONE),
     **ARMS,
     "flowrl": Preset("flowrl", ALONE, {"cpu": {"hidden_size": 256}}),
+    "qsm": Preset("qsm", ALONE, {"cpu": {"actor_hidden_size": 256, "critic_hidden_size": 256}}),
     "sac": Preset("sac", Selector("first", candidates=1)),
     "sac_crossq": Preset(
         "sac", Selector("first", candidates=1), {"paper": SAC_CROSSQ, "cpu": CPU_SAC_CROSSQ}

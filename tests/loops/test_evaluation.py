@@ -53,6 +53,17 @@ def test_every_run_has_every_start_state_once_with_the_selector_and_once_bare(ro
             assert [row["start"] for row in of(of_run, selector)] == list(range(EPISODES))
 
 
+def test_with_one_proposal_only_the_methods_own_action_is_evaluated():
+    settings = presets.settings("point/reach", "sac_flow", "cpu")
+    settings = replace(settings, budget=replace(settings.budget, evaluation_episodes=2))
+    evaluator = Evaluator(settings, Reacher(), TASK.adapters["paper"], seeds=[0])
+    try:
+        [rows] = evaluator.evaluate(Scalar(jnp.zeros(1), jnp.int32(0)), step=400, workers=1)
+    finally:
+        evaluator.close()
+    assert [(row["selector"], row["start"]) for row in rows] == [("bare", 0), ("bare", 1)]
+
+
 def test_a_row_says_when_where_and_how_long(rows):
     row = rows[0][0]
     facts = {name: row[name] for name in ("step", "phase", "adapter", "length")}

@@ -33,10 +33,21 @@ def episode_rows():
 
 @pytest.fixture
 def write_run(tmp_path):
-    """Writes a run evaluated every 100 steps; `success` and `bare` count the successes of each evaluation."""
+    """Writes a run evaluated every 100 steps; `success` and `bare` count the successes of each evaluation.
+
+    Without a `selector` there are bare evaluations only.
+    """
 
     def write(
-        *, preset="p", seed=0, selector="hcpg", success, bare, episodes=10, run_id="a", task="point/reach"
+        *,
+        preset="p",
+        seed=0,
+        selector="hcpg",
+        success=None,
+        bare,
+        episodes=10,
+        run_id="a",
+        task="point/reach",
     ):
         path = tmp_path / task / preset / f"s{seed}" / run_id
         path.mkdir(parents=True)
@@ -45,8 +56,9 @@ def write_run(tmp_path):
         (path / "config.json").write_text("{}")
         (path / "status.json").write_text('{"state": "finished"}')
         rows = [{"step": 50, "phase": "train", "selector": selector, "adapter": "paper", "start": 0}]
-        for place, (count, bare_count) in enumerate(zip(success, bare, strict=True)):
-            rows += _episode_rows(100 * (place + 1), selector, count, episodes)
+        for place, bare_count in enumerate(bare):
+            if success is not None:
+                rows += _episode_rows(100 * (place + 1), selector, success[place], episodes)
             rows += _episode_rows(100 * (place + 1), "bare", bare_count, episodes)
         append_rows(path / "episodes.jsonl", rows)
         speeds = (100.0, 300.0, 400.0)

@@ -15,7 +15,7 @@ from hcpg.report.records import load_runs
 def groups(tmp_path, write_run):
     for seed, success in enumerate(([0, 2, 8, 10], [0, 0, 5, 9], [0, 1, 9, 10])):
         write_run(preset="hcpg_flow", seed=seed, success=success, bare=[0, 0, 3, 8])
-    write_run(preset="sac_flow", seed=0, selector="first", success=[0, 0, 1, 4], bare=[0, 0, 0, 2])
+    write_run(preset="sac_flow", seed=0, bare=[0, 0, 1, 4])
     return load_runs([tmp_path])
 
 
@@ -34,7 +34,7 @@ def test_lines_bands_and_labels(groups, tmp_path):
     for label in (
         "hcpg_flow (selector hcpg)",
         "hcpg_flow, bare actor",
-        "sac_flow (selector first)",
+        "sac_flow",
         "point/reach",
     ):
         assert f"<!-- {label} -->" in text

@@ -15,22 +15,22 @@ def cells(text):
 def groups(tmp_path, write_run):
     write_run(preset="hcpg_flow", seed=0, success=[0, 2, 8, 10, 10, 10], bare=[0, 0, 0, 0, 0, 9])
     write_run(preset="hcpg_flow", seed=1, success=[0, 0, 0, 5, 9, 6], bare=[0, 0, 0, 0, 0, 3])
-    write_run(preset="sac_flow", seed=0, selector="first", success=[0, 0, 1], bare=[0, 0, 0])
+    write_run(preset="sac_flow", seed=0, bare=[0, 0, 1])
     return load_runs([tmp_path])
 
 
 def test_each_cell(groups):
     table = cells(markdown(groups))
     assert table["seeds"] == ["0 1", "0"]
-    assert table["selector"] == ["hcpg", "first"]
+    assert table["selector"] == ["hcpg", "none"]
     assert table["adapter"] == ["paper", "paper"]
     assert table["state"] == ["finished", "finished"]
     assert table["evaluated at step"] == ["600", "300"]
     # 16 of 20 and 1 of 10; Wilson's bounds from an independent table.
     assert table["last evaluation"] == ["80.0 [58.4, 91.9]", "10.0 [1.8, 40.4]"]
     assert table["- by seed"] == ["100 60", "10"]
-    assert table["- bare actor"] == ["60.0 [38.7, 78.1]", "0.0 [0.0, 27.8]"]
-    assert table["- bare, by seed"] == ["90 30", "0"]
+    assert table["- bare actor"] == ["60.0 [38.7, 78.1]", "10.0 [1.8, 40.4]"]
+    assert table["- bare, by seed"] == ["90 30", "10"]
     # Seed 0: (.2 + .8 + 1 + 1 + 1) / 5 = 80 %; seed 1: (0 + 0 + .5 + .9 + .6) / 5 = 40 %; SD = 40 / sqrt(2).
     assert table["last five"] == ["60.0 ± 28.3", "-"]
     # Seed 0: (.1 + .5 + .9 + 1 + 1) / 5 = 70; seed 1: (0 + 0 + .25 + .7 + .75) / 5 = 34; SD = 36 / sqrt(2).

@@ -1,4 +1,8 @@
-"""The evaluation protocol: fixed start states, once with the selector and once bare."""
+"""The evaluation protocol: fixed start states, once with the selector and once bare.
+
+Where the selector has one proposal, there is nothing to choose: such runs are evaluated once, by the method's
+own evaluation action.
+"""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -23,12 +27,10 @@ class Evaluator:
 
     def __init__(self, settings: Settings, method: Method, read_scene: ReadScene, seeds: list[int]) -> None:
         self.episodes = settings.budget.evaluation_episodes
-        self.selector_name = settings.evaluation_selector.rule
         self._settings, self._seeds = settings, seeds
-        self._policies = {
-            self.selector_name: acting.guided(method, settings.evaluation_selector, read_scene),
-            BARE: acting.bare(method),
-        }
+        selector = settings.evaluation_selector
+        guided = {} if selector.alone else {selector.rule: acting.guided(method, selector, read_scene)}
+        self._policies = guided | {BARE: acting.bare(method)}
         self._compiled: dict[str, Callable[..., acting.Chosen]] = {}
         self._pool: Pool | None = None
         self._slots = min(self.episodes, SIMULTANEOUS_EPISODES)

@@ -41,7 +41,7 @@ class Trained(NamedTuple):
     settings: Settings
     """The run's, with the chosen evaluation selector and adapter."""
     name: str
-    """What acts: the evaluation selector's rule, or `bare`."""
+    """What acts: the evaluation selector's rule, or `bare`, also where it has one proposal only."""
     method: Method
     read_scene: ReadScene
     states: Any
@@ -70,7 +70,7 @@ def load(path: Path, choice: Choice) -> Trained:
     seed = seed_of(folder)
     step = choice.step if choice.step is not None or path.name[:5] != "step_" else step_of(path)
     state, found = load_state(folder, jax.jit(method.init)(key(seed, Stream.NETWORKS)), step)
-    name = BARE if choice.selector == BARE else selector.rule
+    name = BARE if choice.selector == BARE or selector.alone else selector.rule
     return Trained(folder, seed, settings, name, method, task.adapters[adapter], stack([state]), found)
 
 

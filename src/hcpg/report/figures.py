@@ -102,8 +102,9 @@ def _line(panel: "Axes", group: Group, selector: str, style: _Style) -> None:
     curve = group.curve(selector)
     if curve is None:
         return
-    bare = selector == BARE
-    label = f"{group.preset}, bare actor" if bare else f"{group.preset} (selector {selector})"
+    bare = selector == BARE and group.selector != BARE
+    names = {BARE: f"{group.preset}, bare actor" if bare else group.preset}
+    label = names.get(selector, f"{group.preset} (selector {selector})")
     panel.plot(
         curve.steps,
         100 * curve.rates.mean(axis=0),

@@ -25,7 +25,7 @@ def _table(groups: Sequence[Group]) -> str:
     rows: dict[str, Callable[[Group], str]] = {
         "seeds": lambda group: " ".join(str(run.seed) for run in group.runs),
         "adapter": lambda group: " ".join(sorted({run.adapter for run in group.runs})),
-        "selector": lambda group: group.selector,
+        "selector": lambda group: "none" if group.selector == BARE else group.selector,
         "state": _states,
         "evaluated at step": _last_step,
         "last evaluation": lambda group: _success(group.curve(group.selector)),

@@ -72,6 +72,11 @@ class Selector:
             raise ValueError(f"bounds is {self.bounds}; the lower must lie below the upper, or give None")
 
     @property
+    def alone(self) -> bool:
+        """Whether there is one proposal, so that nothing is selected."""
+        return self.candidates == 1
+
+    @property
     def needs_noise(self) -> bool:
         """Whether the rule or the direction draws lots, so that `select` must be given `noise`."""
         return RULES[self.rule].needs_noise or self.direction == "random"
