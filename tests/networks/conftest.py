@@ -5,7 +5,7 @@ import jax
 import pytest
 
 from hcpg.networks.batch_renorm import Moments
-from hcpg.networks.flow import FlowActor
+from hcpg.networks.gated_actor import GatedActor
 from hcpg.networks.velocity import FieldMoments
 
 OBSERVATIONS, ACTIONS, HIDDEN, STEPS = 5, 3, 8, 4
@@ -13,7 +13,7 @@ OBSERVATIONS, ACTIONS, HIDDEN, STEPS = 5, 3, 8, 4
 
 @pytest.fixture(scope="session")
 def fresh_actor():
-    return FlowActor.create(jax.random.key(0), (OBSERVATIONS, ACTIONS), HIDDEN, STEPS)
+    return GatedActor.create(jax.random.key(0), (OBSERVATIONS, ACTIONS), HIDDEN)
 
 
 @pytest.fixture(scope="session")

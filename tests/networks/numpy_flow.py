@@ -47,10 +47,10 @@ def path(actor, moments, observations, noise):
     """The samples x_0 ... x_M, the mean of each step, and the deviation they share."""
     deviation = np.exp(log_deviation(actor.deviation, observations))
     samples, means = [np.asarray(noise.start, np.float64)], []
-    for step in range(actor.flow_steps):
-        time = step / actor.flow_steps
+    for step in range(len(noise.steps)):
+        time = step / len(noise.steps)
         means.append(
-            samples[-1] + velocity(actor.field, moments, observations, samples[-1], time) / actor.flow_steps
+            samples[-1] + velocity(actor.field, moments, observations, samples[-1], time) / len(noise.steps)
         )
         samples.append(means[-1] + deviation * np.asarray(noise.steps[step], np.float64))
     return samples, means, deviation

@@ -9,7 +9,8 @@ from numpy_flow import path as path_in_numpy
 from scipy import stats
 
 from hcpg.networks.dense import Dense
-from hcpg.networks.flow import Noise, path_log_prob, tanh_log_slope
+from hcpg.networks.flow import Noise, path_log_prob
+from hcpg.networks.gaussian import tanh_log_slope
 
 ROWS = 6
 LOG_TWO_PI_E = np.log(2 * np.pi * np.e)
@@ -26,9 +27,12 @@ def noise():
 
 
 def entropy(noise, log_deviation):
-    """Of the path, with the tanh correction (the same for all) taken out."""
+    """Of the path whose steps share one deviation, with the tanh correction (the same for all) taken out."""
     end = jnp.zeros(noise.start.shape)
-    return -path_log_prob(noise, log_deviation, end).mean() - tanh_log_slope(end).sum(axis=-1).mean()
+    return (
+        -path_log_prob(noise, len(noise.steps) * log_deviation, end).mean()
+        - tanh_log_slope(end).sum(axis=-1).mean()
+    )
 
 
 def test_the_path_density_is_that_of_its_gaussian_steps(actor, moments, observations, noise):
@@ -84,7 +88,7 @@ def test_the_correction_and_its_slope_are_exact_where_tanh_saturates():
 
 def test_one_training_pass_of_four_steps_counts_four_calls(actor, observations, noise):
     """Deviation from a norm over [observation, sample]: the observation's part moves four times at once."""
-    start = actor.field.moments()
+    start = actor.moments()
     _, after = actor.train(start, observations, noise)
     assert int(after.observation.calls) == int(after.sample.calls) == 4
     mean = np.asarray(observations).mean(axis=0)
@@ -140,6 +144,22 @@ def test_the_deviation_stays_within_its_range(actor, observations):
     assert float(logs.max()) <= 2.0
     centre = eqx.tree_at(lambda network: network.last, actor.deviation, Dense.constant(8, 3, 0.0))
     np.testing.assert_allclose(centre.log(observations), np.full((ROWS, 3), -1.5))
+
+
+def test_the_gradient_by_a_nudge_is_that_by_the_sample_it_moves(actor, moments, observations, noise):
+    """The end's own gradient of the sum of its squares is 2 x_M; the start's is that by the start's noise."""
+
+    def squares(nudges, start):
+        moved = Noise(start, noise.steps)
+        path, _ = actor.train(moments, observations, moved, nudges)
+        return jnp.square(jnp.arctanh(path.actions)).sum()
+
+    nudges = jnp.zeros((5, *noise.start.shape))
+    by_nudges, by_start = jax.grad(squares, argnums=(0, 1))(nudges, noise.start)
+    end = jnp.arctanh(actor.train(moments, observations, noise)[0].actions)
+    np.testing.assert_allclose(by_nudges[-1], 2 * end, rtol=1e-3, atol=1e-5)
+    np.testing.assert_allclose(by_nudges[0], by_start, rtol=1e-4, atol=1e-5)
+    assert float(abs(by_nudges[1] - by_nudges[2]).max()) > 1e-3
 
 
 def test_two_keys_share_no_step_of_noise():

@@ -10,10 +10,12 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from hcpg.interfaces import Metrics
 from hcpg.networks.critics import Critics, CriticState, CrossQ, Polyak, Target
+from hcpg.networks.decoder_actor import DecoderActor
 from hcpg.networks.descent import descend, rest
 from hcpg.networks.flow import FlowActor, Noise
+from hcpg.networks.gated_actor import GatedActor
 from hcpg.networks.maximum_entropy import improve_critics, improve_temperature, pessimistic_values
-from hcpg.networks.velocity import FieldMoments
+from hcpg.networks.plain_actor import PlainActor
 from hcpg.types import Batch, Sampling, Spec
 
 
@@ -21,12 +23,18 @@ from hcpg.types import Batch, Sampling, Spec
 class Config:
     """Settings of SAC-Flow; the defaults are the official from-scratch recipe."""
 
+    velocity: Literal["gated", "decoder", "plain"] = "gated"
+    """gated: Flow-G. decoder: Flow-T. plain: the naive flow, which has no gate."""
+    density: Literal["corrected", "as_published"] = "corrected"
+    """as_published: the path's density leaves out the deviation of the steps (decoder only)."""
     critic: Literal["crossq", "polyak"] = "crossq"
     """crossq: batch renorm, joint pass, no target network. polyak: LayerNorm, target networks."""
     flow_steps: int = 4
     """Euler steps from noise to action."""
     actor_hidden_size: int = 512
-    """Width of the gate, the candidate and the deviation network."""
+    """Width of the gate, the candidate and the deviation network; of the plain field's layers."""
+    decoder_hidden_size: int = 96
+    """Width of the decoder's token; its feed-forward layers are four times as wide."""
     critic_hidden_size: int = 1024
     """Width of the critics' two hidden layers."""
     discount: float = 0.99
@@ -48,12 +56,24 @@ class Config:
     target_rate: float = 0.005
     """Share of the online critics mixed into their targets at each update (polyak only)."""
 
+    def __post_init__(self) -> None:
+        """Refuse a combination that no code published.
+
+        Raises:
+            ValueError: `density` is as_published for a field whose published density is right.
+        """
+        if self.density == "as_published" and self.velocity != "decoder":
+            raise ValueError(
+                f"density 'as_published' is the velocity 'decoder's alone, not that of {self.velocity!r}: "
+                "choose velocity 'decoder', or density 'corrected'"
+            )
+
 
 class State(NamedTuple):
     """Everything that learning changes."""
 
     actor: FlowActor
-    actor_moments: FieldMoments
+    actor_moments: PyTree
     critic: CriticState
     log_temperature: Float[Array, ""]
     actor_optimizer: PyTree
@@ -81,14 +101,14 @@ class SACFlow:
 
     def init(self, key: PRNGKeyArray) -> State:
         """Fresh networks and optimizers."""
-        config, sizes = self.config, (self.spec.observation_size, self.spec.action_size)
+        config = self.config
         of_actor, of_critic = jax.random.split(key)
-        actor = FlowActor.create(of_actor, sizes, config.actor_hidden_size, config.flow_steps)
-        critic = self.critics.init(of_critic, sum(sizes))
+        actor = self._fresh_actor(of_actor)
+        critic = self.critics.init(of_critic, sum(self.spec))
         log_temperature = jnp.log(jnp.asarray(config.initial_temperature))
         return State(
             actor,
-            actor.field.moments(),
+            actor.moments(),
             critic,
             log_temperature,
             rest(self._adam(config.actor_learning_rate), actor),
@@ -96,6 +116,17 @@ class SACFlow:
             rest(self._adam(config.temperature_learning_rate), log_temperature),
             jnp.zeros((), jnp.int32),
         )
+
+    def _fresh_actor(self, key: PRNGKeyArray) -> FlowActor:
+        config, sizes = self.config, (self.spec.observation_size, self.spec.action_size)
+        match config.velocity:
+            case "gated":
+                return GatedActor.create(key, sizes, config.actor_hidden_size)
+            case "plain":
+                return PlainActor.create(key, sizes, config.actor_hidden_size)
+            case "decoder":
+                size, steps = config.decoder_hidden_size, config.flow_steps
+                return DecoderActor.create(key, sizes, size, steps, config.density)
 
     def propose(
         self, state: State, observation: Float[Array, " O"], key: PRNGKeyArray, count: int
@@ -144,8 +175,10 @@ class SACFlow:
         self, state: State, batch: Batch, key: PRNGKeyArray
     ) -> tuple[State, dict[str, Array]]:
         noise = Noise.draw(key, batch.actions.shape, self.config.flow_steps)
-        (loss, (entropy, moments)), gradient = jax.value_and_grad(self._actor_loss, has_aux=True)(
-            state.actor, state, batch.observations, noise
+        nudges = jnp.zeros((self.config.flow_steps + 1, *batch.actions.shape))
+        slopes = jax.value_and_grad(self._actor_loss, argnums=(0, 1), has_aux=True)
+        (loss, (entropy, moments)), (gradient, by_samples) = slopes(
+            state.actor, nudges, state, batch.observations, noise
         )
         adam = self._adam(self.config.actor_learning_rate)
         actor, actor_optimizer = descend(adam, gradient, state.actor_optimizer, state.actor)
@@ -161,13 +194,19 @@ class SACFlow:
             log_temperature=log_temperature,
             temperature_optimizer=temperature_optimizer,
         )
+        start, end = sample_slopes(by_samples[:: self.config.flow_steps])
         norm = optax.tree.norm(gradient)
-        return state, {"actor_loss": loss, "path_entropy": entropy, "actor_gradient": norm}
+        return state, dict(zip(POLICY_METRICS, (loss, entropy, norm, start, end), strict=True))
 
     def _actor_loss(
-        self, actor: FlowActor, state: State, observations: Float[Array, "B O"], noise: Noise
-    ) -> tuple[Float[Array, ""], tuple[Float[Array, ""], FieldMoments]]:
-        path, moments = actor.train(state.actor_moments, observations, noise)
+        self,
+        actor: FlowActor,
+        nudges: Float[Array, "M1 B A"],
+        state: State,
+        observations: Float[Array, "B O"],
+        noise: Noise,
+    ) -> tuple[Float[Array, ""], tuple[Float[Array, ""], PyTree]]:
+        path, moments = actor.train(state.actor_moments, observations, noise, nudges)
         values = pessimistic_values(self.critics, state.critic, observations, path.actions)
         loss = (jnp.exp(state.log_temperature) * path.log_prob - values).mean()
         return loss, (-path.log_prob.mean(), moments)
@@ -176,5 +215,15 @@ class SACFlow:
         return optax.adam(learning_rate, b1=self.config.momentum)
 
 
-POLICY_METRICS = ("actor_loss", "path_entropy", "actor_gradient")
+def sample_slopes(by_samples: Float[Array, "M1 B A"]) -> Float[Array, " M1"]:
+    """Length of one row's gradient by its sample at each time, root mean square over the batch.
+
+    `by_samples` is the gradient of the batch's mean loss.
+    """
+    rows = by_samples.shape[1]
+    return jnp.sqrt(rows * jnp.square(by_samples).sum(axis=(1, 2)))
+
+
+POLICY_METRICS = ("actor_loss", "path_entropy", "actor_gradient", "start_gradient", "end_gradient")
+"""The last three: lengths of the loss's gradient by all parameters, by x_0 and by x_M (`sample_slopes`)."""
 METHOD = SACFlow

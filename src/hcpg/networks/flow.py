@@ -1,15 +1,21 @@
 """A flow actor: noise carried to an action by Euler steps with learned noise on the way."""
 
-from typing import NamedTuple
+import functools
+import operator
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 from jax import numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
-from hcpg.networks.dense import Dense
-from hcpg.networks.gaussian import LOG_SQRT_TWO_PI, bounded_log_deviation, tanh_log_slope
-from hcpg.networks.velocity import FieldMoments, GatedVelocity
+from hcpg.networks.batch_renorm import BatchRenorm, Moments
+from hcpg.networks.gaussian import LOG_SQRT_TWO_PI, tanh_log_slope
+
+Normalise = Callable[..., tuple[Array, Moments]]
+"""(norm, moments, x, calls = 1) -> y and the moments after it: `BatchRenorm.train` or `at_rest`."""
 
 
 class Noise(NamedTuple):
@@ -34,110 +40,105 @@ class Path(NamedTuple):
     """Log-density of the path (start and all steps) with the tanh correction: not the action's own."""
 
 
-class Deviation(eqx.Module):
-    """Standard deviation of the step noise, from the raw observation alone.
+class Push(NamedTuple):
+    """What moves the sample in one step."""
 
-    It depends neither on the sample nor on the time, so a flow computes it once.
-    """
-
-    first: Dense
-    second: Dense
-    last: Dense
-
-    @classmethod
-    def create(
-        cls, key: PRNGKeyArray, observation_size: int, action_size: int, hidden_size: int
-    ) -> "Deviation":
-        """Two hidden ReLU layers."""
-        keys = jax.random.split(key, 3)
-        return cls(
-            Dense.create(keys[0], observation_size, hidden_size),
-            Dense.create(keys[1], hidden_size, hidden_size),
-            Dense.create(keys[2], hidden_size, action_size),
-        )
-
-    def log(self, observations: Float[Array, "*batch O"]) -> Float[Array, "*batch A"]:
-        """Logarithm of the deviation, within [-5, 2]."""
-        hidden = jax.nn.relu(self.second(jax.nn.relu(self.first(observations))))
-        return bounded_log_deviation(self.last(hidden))
+    velocity: Float[Array, "*batch A"]
+    log_deviation: Float[Array, "*state A"]
+    """Of the noise added to the sample itself, whatever space a field draws it in."""
+    counted: Float[Array, "*state A"]
+    """`log_deviation` as the path's density counts it; they differ in a published defect alone."""
 
 
 class FlowActor(eqx.Module):
-    """The velocity field and the step noise of one policy.
+    """A chain of Gaussian steps from noise to an action; a subclass says what moves the sample.
 
     Source: paper, equations (1) and (2). Deviation: as in SAC-Flow's code each step adds noise
     `deviation * normal` (no square root of the step size), and tanh bounds the action.
     """
 
-    field: GatedVelocity
-    deviation: Deviation
-    flow_steps: int = eqx.field(static=True)
+    @abstractmethod
+    def moments(self) -> PyTree:
+        """Fresh running statistics of all its normalising layers."""
 
-    @classmethod
-    def create(
-        cls, key: PRNGKeyArray, sizes: tuple[int, int], hidden_size: int, flow_steps: int
-    ) -> "FlowActor":
-        """A fresh actor for (observation, action) `sizes`."""
-        of_field, of_deviation = jax.random.split(key)
-        return cls(
-            GatedVelocity.create(of_field, *sizes, hidden_size),
-            Deviation.create(of_deviation, *sizes, hidden_size),
-            flow_steps,
-        )
+    @abstractmethod
+    def begin(
+        self, moments: Any, observations: Float[Array, "*state O"], flow_steps: int, normalise: Normalise
+    ) -> tuple[Any, Any]:
+        """What the steps share, computed once per flow (the drive), and the moments after it."""
 
-    def infer(self, moments: FieldMoments, observations: Float[Array, "*batch O"], noise: Noise) -> Path:
+    @abstractmethod
+    def push(
+        self, drive: Any, step: int, sample: Float[Array, "*batch A"], moments: Any, normalise: Normalise
+    ) -> tuple[Push, Any]:
+        """What moves `sample` in step number `step`, and the moments after it."""
+
+    def infer(self, moments: PyTree, observations: Float[Array, "*state O"], noise: Noise) -> Path:
         """Paths under the running statistics; `noise` may have more leading axes than needed."""
-        field = self.field
-        normalised = field.observation_norm.infer(moments.observation, observations)
-        drive = field.drive(normalised, self._times())
-        log_deviation = self.deviation.log(observations)
-        sample = noise.start
-        for step in range(self.flow_steps):
-            inputs = field.sample_norm.infer(moments.sample, sample)
-            velocity = field.velocity(drive[step], inputs, sample)
-            sample = self._advance(sample, velocity, log_deviation, noise.steps[step])
-        return Path(jnp.tanh(sample), path_log_prob(noise, log_deviation, sample))
+        return self._run(moments, observations, noise, at_rest, _no_nudges(noise))[0]
 
     def train(
-        self, moments: FieldMoments, observations: Float[Array, "B O"], noise: Noise
-    ) -> tuple[Path, FieldMoments]:
-        """Paths under the batch's statistics, and the running statistics after them."""
-        field, steps = self.field, self.flow_steps
-        normalised, seen = field.observation_norm.train(moments.observation, observations, steps)
-        drive = field.drive(normalised, self._times())
-        log_deviation = self.deviation.log(observations)
-        sample, of_sample = noise.start, moments.sample
-        for step in range(steps):
-            inputs, of_sample = field.sample_norm.train(of_sample, sample)
-            velocity = field.velocity(drive[step], inputs, sample)
-            sample = self._advance(sample, velocity, log_deviation, noise.steps[step])
-        path = Path(jnp.tanh(sample), path_log_prob(noise, log_deviation, sample))
-        return path, FieldMoments(seen, of_sample)
-
-    def _times(self) -> Float[Array, " M"]:
-        return jnp.arange(self.flow_steps) / self.flow_steps
-
-    def _advance(
         self,
-        sample: Float[Array, "*batch A"],
-        velocity: Float[Array, "*batch A"],
-        log_deviation: Float[Array, "*state A"],
-        noise: Float[Array, "*batch A"],
-    ) -> Float[Array, "*batch A"]:
-        return sample + velocity / self.flow_steps + jnp.exp(log_deviation) * noise
+        moments: PyTree,
+        observations: Float[Array, "B O"],
+        noise: Noise,
+        nudges: Float[Array, "M1 *batch A"] | None = None,
+    ) -> tuple[Path, PyTree]:
+        """Paths under the batch's statistics, and the running statistics after them.
+
+        `nudges` are added to x_0 ... x_M: the gradient of a loss by zero nudges is that by the samples.
+        """
+        nudges = _no_nudges(noise) if nudges is None else nudges
+        return self._run(moments, observations, noise, BatchRenorm.train, nudges)
+
+    def _run(
+        self,
+        moments: PyTree,
+        observations: Float[Array, "*state O"],
+        noise: Noise,
+        normalise: Normalise,
+        nudges: Float[Array, "M1 *batch A"],
+    ) -> tuple[Path, PyTree]:
+        flow_steps = len(noise.steps)
+        drive, moments = self.begin(moments, observations, flow_steps, normalise)
+        sample, counted = noise.start + nudges[0], []
+        for step in range(flow_steps):
+            push, moments = self.push(drive, step, sample, moments, normalise)
+            spread = jnp.exp(push.log_deviation) * noise.steps[step]
+            sample = sample + push.velocity / flow_steps + spread + nudges[step + 1]
+            counted.append(push.counted)
+        total = functools.reduce(operator.add, counted)
+        return Path(jnp.tanh(sample), path_log_prob(noise, total, sample)), moments
+
+
+def _no_nudges(noise: Noise) -> Float[Array, "M1 *batch A"]:
+    return jnp.zeros((len(noise.steps) + 1, *noise.start.shape))
+
+
+def at_rest(
+    norm: BatchRenorm, moments: Moments, x: Float[Array, "*batch F"], calls: int = 1
+) -> tuple[Float[Array, "*batch F"], Moments]:
+    """`x` normalised by the running moments, which stay as they are however many `calls` it stands for."""
+    return norm.infer(moments, x), moments
+
+
+def step_times(flow_steps: int) -> Float[Array, " M"]:
+    """The time at which each step begins, in [0, 1)."""
+    return jnp.arange(flow_steps) / flow_steps
 
 
 def path_log_prob(
-    noise: Noise, log_deviation: Float[Array, "*state A"], end: Float[Array, "*batch A"]
+    noise: Noise, log_deviations: Float[Array, "*state A"], end: Float[Array, "*batch A"]
 ) -> Float[Array, "*batch"]:
     """Log-density of start and steps, less the log-determinant of tanh.
 
-    A step's residual over its deviation is the drawn noise itself, so the density needs no residuals,
-    and entropy reaches the parameters through the deviation and the tanh only.
+    `log_deviations` is their sum over the steps. A step's residual over its deviation is the drawn noise
+    itself, so the density needs no residuals, and entropy reaches the parameters through the deviation and
+    the tanh only.
 
     Source: SAC-Flow's path density, used by the paper as the original objective (section III-A).
     """
     flow_steps = noise.steps.shape[0]
     squares = jnp.square(noise.start) + jnp.square(noise.steps).sum(axis=0)
-    gaussian = -0.5 * squares - flow_steps * log_deviation - (flow_steps + 1) * LOG_SQRT_TWO_PI
+    gaussian = -0.5 * squares - log_deviations - (flow_steps + 1) * LOG_SQRT_TWO_PI
     return (gaussian - tanh_log_slope(end)).sum(axis=-1)
