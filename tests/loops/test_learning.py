@@ -10,7 +10,7 @@ from stand_ins import Follower, Scalar
 
 from hcpg import presets, registry
 from hcpg.loops import learning, replay
-from hcpg.types import Batch, Spec
+from hcpg.types import Batch, Sampling, Spec
 
 SPEC = Spec(3, 4)
 
@@ -78,6 +78,16 @@ def test_a_run_learns_among_others_as_alone(learn):
     own, metrics, _ = alone(fresh(1), memory_of(1, rewards[1:]), *keys)
     np.testing.assert_allclose(own.level[0], both.level[1], rtol=1e-6)
     assert metrics["level"].shape == (1,)
+
+
+def test_batches_are_drawn_as_the_method_wants_them():
+    class Forgetful(Follower):
+        sampling = Sampling(recent_share=1.0, recent_window=2)
+
+    rewards = [[5.0] * 6 + [1.0, 1.0], [5.0] * 6 + [2.0, 2.0]]
+    of_the_newest = learning.compiled(Forgetful(), Scalar, runs=2, updates=4, batch_size=3)
+    states, _, _ = of_the_newest(fresh(2), memory_of(2, rewards), *keys_of(2))
+    assert states.level.tolist() == [4.0, 8.0]
 
 
 def test_a_run_that_diverges_is_told_and_the_other_goes_on(learn):

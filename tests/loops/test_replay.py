@@ -2,16 +2,18 @@
 
 import jax
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from jax import numpy as jnp
 
 from hcpg.loops import replay
-from hcpg.types import Batch, Spec
+from hcpg.types import Batch, Sampling, Spec
 
 SPEC = Spec(observation_size=2, action_size=1)
 RUNS, CAPACITY = 2, 6
+UNIFORM, RECENT = Sampling(), Sampling(recent_share=0.2, recent_window=2048)
 insert = jax.jit(replay.insert)
 
 
@@ -52,9 +54,12 @@ def test_four_and_a_half_rings_leave_the_last_six_rows():
     assert rows.tolist() == [24, 25, 26, 21, 22, 23]  # 27 rows: 24 to 26 stand where the ring began anew
 
 
-def draw(memory, size):
-    row = jax.tree.map(lambda ring: ring[0], memory.transitions)
-    return replay.sample(row, memory.inserted, jax.random.key(0), size)
+def rows_of(memory):
+    return jax.tree.map(lambda ring: ring[0], memory.transitions), memory.inserted
+
+
+def draw(memory, size, sampling=UNIFORM, seed=0):
+    return replay.sample(*rows_of(memory), jax.random.key(seed), size, sampling)
 
 
 def test_a_sample_is_uniform_over_what_is_filled():
@@ -69,6 +74,74 @@ def test_a_sampled_row_keeps_its_parts_together():
     assert set(batch.rewards.tolist()) == {21, 22, 23, 24, 25, 26}
     np.testing.assert_array_equal(batch.actions[:, 0], batch.rewards)
     np.testing.assert_array_equal(batch.next_observations[:, 0], batch.rewards + 0.5)
+
+
+def test_uniform_sampling_draws_the_rows_it_always_drew():
+    """Bit for bit, so that no result of a method that wants nothing else changes."""
+    memory, key = filled(9, 3), jax.random.key(7)
+    rows = jax.random.randint(key, (100,), 0, CAPACITY)
+    expected = memory.transitions.rewards[0][rows]
+    np.testing.assert_array_equal(draw(memory, 100, UNIFORM, seed=7).rewards, expected)
+    windowed = Sampling(recent_share=0.0, recent_window=1)
+    np.testing.assert_array_equal(draw(memory, 100, windowed, seed=7).rewards, expected)
+
+
+@pytest.fixture(scope="module")
+def wrapped():
+    """A ring of 5000 after 6000 rows: the next goes to position 1000, in the middle of the newest 2048."""
+    memory = replay.create(RUNS, 5000, SPEC)
+    for index in range(60):
+        memory = insert(memory, arrivals(index * 100, 100))
+    assert int(memory.inserted % 5000) == 1000
+    return memory
+
+
+def test_the_recent_rows_are_the_last_2048_also_across_the_wrap(wrapped):
+    drawn = np.asarray(draw(wrapped, 40_000, Sampling(1.0, 2048)).rewards, int)
+    seen, counts = np.unique(drawn, return_counts=True)
+    assert seen.tolist() == list(range(3952, 6000))
+    assert counts.max() < 19.6 + 6 * np.sqrt(19.6)  # 40000 / 2048 = 19.5 each
+
+
+def test_a_fifth_of_the_batch_is_recent_and_the_rest_is_uniform(wrapped):
+    batches = jax.vmap(lambda key: replay.sample(*rows_of(wrapped), key, 256, RECENT).rewards)
+    drawn = np.asarray(batches(jax.random.split(jax.random.key(0), 200)), int)
+    assert drawn.shape == (200, 256)
+    assert drawn[:, 205:].min() >= 3952  # 51 of 256
+    uniform = drawn[:, :205].ravel()
+    assert 1000 <= uniform.min() < 1010
+    counts = np.bincount((uniform - 1000) // 1000, minlength=5)
+    assert np.abs(counts - 8200).max() < 4 * np.sqrt(41_000 * 0.2 * 0.8)
+    assert abs(np.corrcoef(drawn[:, 0], drawn[:, 205])[0, 1]) < 4 / np.sqrt(200)
+
+
+def test_repeated_rows_are_as_rare_as_said(wrapped):
+    """Of n rows out of N, n - N (1 - (1 - 1/N)^n) repeat another: 0.617 of 51, 4.12 of 205."""
+    batches = jax.vmap(lambda key: replay.sample(*rows_of(wrapped), key, 256, RECENT).rewards)
+    drawn = np.sort(batches(jax.random.split(jax.random.key(1), 2000)).reshape(2000, 256)[:, 205:])
+    repeats = (np.diff(drawn) == 0).sum(axis=1)
+    np.testing.assert_allclose(repeats.mean(), 0.617, atol=4 * np.sqrt(0.617 / 2000))
+
+
+def test_until_the_window_is_full_recent_rows_are_all_there_are():
+    counts = np.bincount(
+        np.asarray(draw(filled(2, 2), 8000, Sampling(1.0, 5)).rewards, int), minlength=CAPACITY
+    )
+    assert counts[4:].sum() == 0  # the two rows never written
+    assert np.abs(counts[:4] - 2000).max() < 4 * np.sqrt(8000 * 0.25 * 0.75)
+
+
+def test_a_window_larger_than_the_ring_is_the_ring():
+    assert set(draw(filled(9, 3), 200, Sampling(1.0, 100)).rewards.tolist()) == {21, 22, 23, 24, 25, 26}
+    assert set(draw(filled(9, 3), 200, Sampling(1.0, 2)).rewards.tolist()) == {25, 26}
+
+
+def test_a_recent_row_keeps_its_parts_together():
+    batch = draw(filled(9, 3), 100, Sampling(0.5, 4))
+    np.testing.assert_array_equal(batch.actions[:, 0], batch.rewards)
+    np.testing.assert_array_equal(batch.next_observations[:, 0], batch.rewards + 0.5)
+    assert set(batch.rewards[50:].tolist()) == {23, 24, 25, 26}
+    assert set(batch.rewards[:50].tolist()) == {21, 22, 23, 24, 25, 26}
 
 
 def test_a_refilled_ring_goes_on_as_the_old_one_would():
