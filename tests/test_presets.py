@@ -64,6 +64,30 @@ def test_hcpg_flow_blends_four_and_sac_flow_takes_the_only_one():
     assert PRESETS["sac_flow"].selector == Selector("first", candidates=1)
 
 
+@pytest.mark.parametrize("budget", BUDGETS)
+@pytest.mark.parametrize("velocity", ["decoder", "plain"])
+def test_the_other_fields_differ_from_sac_flow_in_the_field_alone(velocity, budget):
+    plain = presets.settings("point/carry", "sac_flow", budget)
+    chosen = presets.settings("point/carry", f"sac_flow_{velocity}", budget)
+    assert chosen.learner == replace(plain.learner, velocity=velocity)
+    assert chosen.selector == plain.selector
+
+
+def test_the_recipes_with_target_networks_have_their_published_numbers():
+    polyak, rlinf = (
+        presets.settings("point/carry", f"sac_flow_{name}", "paper").learner for name in ("polyak", "rlinf")
+    )
+    for each in (polyak, rlinf):
+        rates = each.actor_learning_rate, each.critic_learning_rate, each.temperature_learning_rate
+        assert rates == (3e-4, 3e-4, 3e-4)
+        assert (each.critic, each.target_rate, each.momentum) == ("polyak", 0.005, 0.9)
+        assert (each.initial_temperature, each.flow_steps) == (0.2, 4)
+    assert (polyak.velocity, polyak.policy_delay, polyak.critic_hidden_size) == ("gated", 1, 512)
+    assert (polyak.discount, polyak.target_entropy) == (0.99, 0.0)
+    assert (rlinf.velocity, rlinf.policy_delay, rlinf.critic_hidden_size) == ("decoder", 3, 256)
+    assert (rlinf.discount, rlinf.target_entropy, rlinf.decoder_hidden_size) == (0.8, -4.0, 96)
+
+
 def test_the_papers_budget_is_the_papers():
     paper = BUDGETS["paper"]
     assert (paper.steps, paper.warmup_steps, paper.batch_size) == (1_000_000, 50_000, 512)

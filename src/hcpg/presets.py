@@ -96,12 +96,43 @@ SAC_CROSSQ = {
 }
 CPU_SAC_CROSSQ = {**SAC_CROSSQ, **CPU_DISCOUNT, "critic_hidden_size": 256, "actor_learning_rate": 1e-3}
 
+# The critics and rates of SAC-Flow's offline-to-online code, and no more of it: there is no offline phase, no
+# pull towards the data's actions and no action chunks here; the target takes the critics' minimum (there: the
+# mean), critics have two ReLU layers (there: four with GELU), and the noise is learned (there: fixed).
+SAC_FLOW_POLYAK = {
+    "critic": "polyak",
+    "critic_hidden_size": 512,
+    "critic_learning_rate": 3e-4,
+    "temperature_learning_rate": 3e-4,
+    "momentum": 0.9,
+    "policy_delay": 1,
+}
+# The numbers of RLinf's SAC-Flow for ManiSkill's PickCube, where settings for them exist. There it has ten
+# critics (here: two), LayerNorm in the decoder (here: batch renorm), gradients clipped at 1, other bounds of
+# the deviation while acting, a softplus temperature, and 32 environments with one update per step.
+SAC_FLOW_RLINF = {
+    "velocity": "decoder",
+    "critic": "polyak",
+    "critic_hidden_size": 256,
+    "critic_learning_rate": 3e-4,
+    "temperature_learning_rate": 3e-4,
+    "momentum": 0.9,
+    "discount": 0.8,
+    "target_entropy": -4.0,
+}
+
 HCPG, ALONE = Selector("hcpg", candidates=4), Selector("first", candidates=1)
 
 
 def _arm(selector: Selector, evaluation_selector: Selector | None = None) -> Preset:
     """SAC-Flow with another selector: a control that takes HCPG apart."""
     return Preset("sac_flow", selector, {"cpu": CPU_SAC_FLOW}, evaluation_selector)
+
+
+def _field(velocity: str) -> Preset:
+    """SAC-Flow with another velocity field, and nothing else changed."""
+    chosen = {"velocity": velocity}
+    return Preset("sac_flow", ALONE, {"paper": chosen, "cpu": {**CPU_SAC_FLOW, **chosen}})
 
 
 ARMS = {
@@ -124,6 +155,12 @@ PRESETS = {
     "hcpg_flow": _arm(HCPG),
     "sac_flow": _arm(ALONE),
     **ARMS,
+    "sac_flow_decoder": _field("decoder"),
+    "sac_flow_plain": _field("plain"),
+    "sac_flow_polyak": Preset(
+        "sac_flow", ALONE, {"paper": SAC_FLOW_POLYAK, "cpu": {**SAC_FLOW_POLYAK, **CPU_SAC_FLOW}}
+    ),
+    "sac_flow_rlinf": Preset("sac_flow", ALONE, {"paper": SAC_FLOW_RLINF, "cpu": SAC_FLOW_RLINF}),
     "flowrl": Preset("flowrl", ALONE, {"cpu": {**CPU_DISCOUNT, "hidden_size": 256}}),
     "qsm": Preset(
         "qsm", ALONE, {"cpu": {**CPU_DISCOUNT, "actor_hidden_size": 256, "critic_hidden_size": 256}}
