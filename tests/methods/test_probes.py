@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from probes import DISCOUNT, SPEC, Probe, learned, proposals, values
 
-from hcpg.methods import flowrl
+from hcpg.methods import flowrl, sac
 from hcpg.methods.sac_flow import Config, SACFlow
 
 
@@ -26,9 +26,25 @@ def sac_flow(critic):
     )
 
 
+def sac_with(critic):
+    config = sac.Config(
+        critic=critic,
+        actor_hidden_size=16,
+        critic_hidden_size=16,
+        discount=DISCOUNT,
+        actor_learning_rate=3e-3,
+        critic_learning_rate=3e-3,
+        initial_temperature=1e-6,
+        target_rate=0.05,
+    )
+    return sac.SAC(config, SPEC)
+
+
 METHODS = {
     "sac_flow crossq": sac_flow("crossq"),
     "sac_flow polyak": sac_flow("polyak"),
+    "sac plain": sac_with("plain"),
+    "sac crossq": sac_with("crossq"),
     "flowrl": flowrl.FlowRL(
         flowrl.Config(
             hidden_size=16, discount=DISCOUNT, learning_rate=3e-3, policy_delay=1, anchor_weight=1e-3
