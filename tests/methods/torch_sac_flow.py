@@ -1,7 +1,6 @@
 """One update of SAC-Flow, written again in float64 PyTorch from the equations: autograd, torch's Adam.
 
-It shares nothing with the package but the order of the parameters: a tree of JAX arrays becomes the same
-tree of torch tensors, and the noise comes in as numbers.
+It shares nothing with the package but the order of the parameters; the actors are in torch_fields.py.
 """
 
 from typing import NamedTuple
@@ -9,8 +8,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 import torch
-
-EPSILON = 1e-3
+from torch_fields import EPSILON, Norms, by_batch, by_running, constants, dense, flow, moved, tensors
 
 
 class Learned(NamedTuple):
@@ -20,60 +18,6 @@ class Learned(NamedTuple):
     gradient: list
     parameters: list
     extra: dict
-
-
-def constants(tree):
-    return jax.tree.map(lambda leaf: torch.tensor(np.array(leaf), dtype=torch.float64), tree)
-
-
-def tensors(tree):
-    return jax.tree.map(torch.Tensor.requires_grad_, constants(tree))
-
-
-def dense(layer, x):
-    return x @ layer.kernel + layer.bias
-
-
-def by_running(norm, moments, x):
-    return (x - moments.mean) / torch.sqrt(moments.variance + EPSILON) * norm.scale + norm.bias
-
-
-def by_batch(norm, x):
-    centred = x - x.mean(0)
-    return centred / torch.sqrt((centred**2).mean(0) + EPSILON) * norm.scale + norm.bias
-
-
-def moved(moments, x):
-    """Running mean and variance after one call on the batch `x`."""
-    x = x.detach()
-    mean, variance = x.mean(0), x.var(0, unbiased=False)
-    return 0.99 * moments[0] + 0.01 * mean, 0.99 * moments[1] + 0.01 * variance
-
-
-def time_features(field, time):
-    frequencies = torch.tensor([10 ** (-4 * i / 15) for i in range(16)], dtype=torch.float64)
-    waves = torch.cat([torch.sin(time * frequencies), torch.cos(time * frequencies)])
-    return dense(field.time_outer, torch.nn.functional.silu(dense(field.time_inner, waves)))
-
-
-def flow(actor, observations, noise, normalise):
-    """tanh of the flow's end and the path's log-density; `normalise` gives the inputs of the velocity."""
-    field, spread = actor.field, actor.deviation
-    hidden = torch.relu(dense(spread.second, torch.relu(dense(spread.first, observations))))
-    deviation = torch.exp(-5 + 3.5 * (torch.tanh(dense(spread.last, hidden)) + 1))
-    start, steps = constants(noise.start), constants(noise.steps)
-    sample = start
-    log_prob = torch.distributions.Normal(0.0, 1.0).log_prob(start).sum(-1)
-    for step, drawn in enumerate(steps):
-        times = time_features(field, step / len(steps)).expand(len(start), -1)
-        inputs = torch.cat([*normalise(observations, sample), times], dim=-1)
-        of_gate, of_candidate = torch.nn.functional.silu(dense(field.inner, inputs)).chunk(2, dim=-1)
-        velocity = torch.sigmoid(dense(field.gate, of_gate)) * (dense(field.candidate, of_candidate) - sample)
-        mean = sample + velocity / len(steps)
-        sample = mean + deviation * drawn
-        log_prob = log_prob + torch.distributions.Normal(mean, deviation).log_prob(sample).sum(-1)
-    squashed = torch.tanh(sample)
-    return squashed, log_prob - torch.log(1 - squashed**2 + 1e-6).sum(-1)
 
 
 def one_critic(networks, index):
@@ -111,16 +55,8 @@ def critic_update(config, state, batch, noise):
     actor, critic = constants(state.actor), state.critic
     networks, running = tensors(critic.networks), constants(critic.moments)
     data = constants(batch)
-    actor_running = constants(state.actor_moments)
-
-    def acting(observations, sample):
-        field = actor.field
-        return (
-            by_running(field.observation_norm, actor_running.observation, observations),
-            by_running(field.sample_norm, actor_running.sample, sample),
-        )
-
-    next_actions, log_prob = flow(actor, data.next_observations, noise, acting)
+    acting = Norms(state.actor_moments, learning=False)
+    next_actions, log_prob = flow(actor, config, acting, data.next_observations, noise)
     now = torch.cat([data.observations, data.actions], dim=-1)
     then = torch.cat([data.next_observations, next_actions], dim=-1)
     values, next_values, statistics = [], [], []
@@ -153,23 +89,8 @@ def critic_update(config, state, batch, noise):
     )
 
 
-def actor_update(config, state, batch, noise):
-    """Loss, gradient and new parameters of the actor; in `extra` the entropy and the new statistics.
-
-    `state` has the critic that the loss sees: the one after this update's critic step.
-    """
-    actor, critic = tensors(state.actor), constants(state.critic)
-    observations = constants(batch.observations)
-    statistics = tuple(constants(state.actor_moments.sample)[:2])
-    observed = tuple(constants(state.actor_moments.observation)[:2])
-
-    def learning(observations, sample):
-        nonlocal statistics, observed
-        statistics, observed = moved(statistics, sample), moved(observed, observations)
-        field = actor.field
-        return by_batch(field.observation_norm, observations), by_batch(field.sample_norm, sample)
-
-    actions, log_prob = flow(actor, observations, noise, learning)
+def actor_loss(config, state, observations, actions, log_prob):
+    critic = constants(state.critic)
     inputs = torch.cat([observations, actions], dim=-1)
     values = []
     for index in (0, 1):
@@ -182,8 +103,28 @@ def actor_update(config, state, batch, noise):
             return by_running(norm, one_critic(critic.moments[place], index), x)
 
         values.append(renorm_critic(network, inputs, normalise))
-    loss = (float(np.exp(state.log_temperature)) * log_prob - torch.minimum(*values)).mean()
+    return (float(np.exp(state.log_temperature)) * log_prob - torch.minimum(*values)).mean()
+
+
+def slopes_by_ends(config, state, batch, noise):
+    """The gradients of the actor's loss by x_0 and by x_M, the noise that led there held."""
+    observations, norms = constants(batch.observations), Norms(state.actor_moments, learning=True)
+    nudges = torch.zeros((2, *noise.start.shape), dtype=torch.float64, requires_grad=True)
+    actions, log_prob = flow(constants(state.actor), config, norms, observations, noise, nudges)
+    actor_loss(config, state, observations, actions, log_prob).backward()
+    return nudges.grad.numpy()
+
+
+def actor_update(config, state, batch, noise):
+    """Loss, gradient and new parameters of the actor; in `extra` the entropy and the new statistics.
+
+    `state` has the critic that the loss sees: the one after this update's critic step.
+    """
+    actor, observations = tensors(state.actor), constants(batch.observations)
+    learning = Norms(state.actor_moments, learning=True)
+    actions, log_prob = flow(actor, config, learning, observations, noise)
+    loss = actor_loss(config, state, observations, actions, log_prob)
     entropy = -float(log_prob.detach().mean())
     gradient, parameters = adam(actor, loss, config.actor_learning_rate)
-    extra = {"entropy": entropy, "statistics": {"observation": observed, "sample": statistics}}
+    extra = {"entropy": entropy, "statistics": learning.seen}
     return Learned(float(loss.detach()), gradient, parameters, extra)
