@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from probes import DISCOUNT, SPEC, Probe, learned, proposals, values
 
-from hcpg.methods import flowrl, sac
+from hcpg.methods import flowrl, qsm, sac
 from hcpg.methods.sac_flow import Config, SACFlow
 
 
@@ -48,6 +48,21 @@ METHODS = {
     "flowrl": flowrl.FlowRL(
         flowrl.Config(
             hidden_size=16, discount=DISCOUNT, learning_rate=3e-3, policy_delay=1, anchor_weight=1e-3
+        ),
+        SPEC,
+    ),
+    # With Q = -(a - best)^2 the last of ten steps takes x to 1.0302 x - 0.2477 * 2 * 2.08 (x - best): that is
+    # 1.03 best for any x. At other scales samples swing around it or fall short; at 50 they sit at bounds.
+    "qsm": qsm.QSM(
+        qsm.Config(
+            diffusion_steps=10,
+            gradient_scale=2.08,
+            actor_hidden_size=16,
+            critic_hidden_size=128,
+            discount=DISCOUNT,
+            actor_learning_rate=3e-3,
+            critic_learning_rate=3e-3,
+            target_rate=0.05,
         ),
         SPEC,
     ),
