@@ -29,6 +29,11 @@ class Budget:
     """Episodes per evaluation, each run with the selector and bare; one start state each."""
     replay_capacity: int = 1_000_000
     """Transitions kept; the oldest are overwritten."""
+    training_horizon: int | None = None
+    """Steps after which a training episode is cut, which bootstraps, if the task's own limit is not sooner.
+
+    Evaluation always has the task's own limit; None leaves it to training, too.
+    """
 
 
 @dataclass(frozen=True)
@@ -190,6 +195,7 @@ BUDGETS = {
         evaluations=12,
         evaluation_episodes=20,
         replay_capacity=200_000,
+        training_horizon=200,
     ),
 }
 

@@ -51,6 +51,16 @@ def test_episodes_have_exactly_the_horizon_and_the_next_start_follows(played):
         assert arrivals[59].observations[index].tolist() == again.tolist()
 
 
+def test_episodes_can_be_cut_before_the_tasks_own_limit():
+    with Pool(TASK, [5, 6], workers=2, horizon=7) as pool:
+        pool.reset(np.zeros(2, int))
+        cut = []
+        for _ in range(15):
+            pool.send(np.zeros((2, 4), np.float32), np.ones(2, int))
+            cut.append(pool.receive().truncated.all())
+    assert [step for step, each in enumerate(cut) if each] == [6, 13]
+
+
 def test_the_true_last_observation_comes_back_beside_the_reset_one(played):
     first, actions, arrivals = played
     environment = registry.suite("point").make(registry.task(TASK), 6)

@@ -101,6 +101,7 @@ def test_a_long_run_writes_a_hundred_rows_and_a_short_one_a_row_per_tick():
         ({"updates_per_step": float("nan")}, "updates_per_step nan must be positive"),
         ({"batch_size": 0}, "batch_size 0 must be at least 1"),
         ({"evaluations": 0}, "evaluations 0 must be at least 1"),
+        ({"training_horizon": 0}, "training_horizon 0 must be at least 1"),
         ({"evaluations": 26}, "evaluations 26 must be at most one per step of 4 environments"),
         ({"evaluation_episodes": 0}, "evaluation_episodes 0 must be at least 1"),
         ({"warmup_steps": 9}, "warmup_steps 9 must fill a batch of 10"),

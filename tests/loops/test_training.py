@@ -1,5 +1,7 @@
 """Training is a function of the settings and the seed: stops, resumes and company change nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from safetensors.numpy import load_file
@@ -78,9 +80,21 @@ def test_a_run_whose_reward_is_not_finite_stops_alone(straight, tmp_path, monkey
     assert list(folders[1].checkpoints.iterdir()) == []
 
 
+def test_a_training_horizon_cuts_training_episodes_and_no_others(tmp_path):
+    settings = tiny_settings()
+    settings = replace(settings, budget=replace(settings.budget, training_horizon=20))
+    [folder] = sitting.create_folders(settings, [0], tmp_path)
+    sit(settings, [folder])
+    lengths = {
+        phase: {row["length"] for row in folder.rows("episodes") if row["phase"] == phase}
+        for phase in ("train", "evaluation")
+    }
+    assert lengths == {"train": {20}, "evaluation": {60}}
+
+
 def test_another_configuration_is_refused(straight):
     folder, _ = straight
-    with pytest.raises(RunFolderError, match=r"learner.discount: 0.99 in the run, 0.9 asked for"):
+    with pytest.raises(RunFolderError, match=r"learner.discount: 0.97 in the run, 0.9 asked for"):
         sit(tiny_settings(discount=0.9), [folder])
 
 

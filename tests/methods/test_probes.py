@@ -8,13 +8,15 @@ from hcpg.methods import flowrl, qsm, sac
 from hcpg.methods.sac_flow import Config, SACFlow
 
 
-def sac_flow(critic):
+def sac_flow(critic, velocity="gated"):
     return SACFlow(
         Config(
+            velocity=velocity,
             critic=critic,
             flow_steps=2,
             actor_hidden_size=16,
             critic_hidden_size=16,
+            decoder_hidden_size=8,
             discount=DISCOUNT,
             actor_learning_rate=3e-3,
             critic_learning_rate=3e-3,
@@ -43,6 +45,8 @@ def sac_with(critic):
 METHODS = {
     "sac_flow crossq": sac_flow("crossq"),
     "sac_flow polyak": sac_flow("polyak"),
+    "sac_flow plain": sac_flow("crossq", "plain"),
+    "sac_flow decoder": sac_flow("crossq", "decoder"),
     "sac plain": sac_with("plain"),
     "sac crossq": sac_with("crossq"),
     "flowrl": flowrl.FlowRL(

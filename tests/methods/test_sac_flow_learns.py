@@ -1,7 +1,11 @@
-"""HCPG-Flow learns the point suite from scratch, and early on it is the selector that acts well."""
+"""HCPG-Flow learns the point suite from scratch, and early on it is the selector that acts well.
+
+SAC-Flow's other fields learn it without a selector.
+"""
 
 from statistics import mean
 
+import pytest
 from training import successes, trained
 
 # Rewards lie in [0, 1] and the path's entropy starts near 20 nats, hence the small temperature.
@@ -29,3 +33,12 @@ def test_early_in_carrying_the_selector_earns_a_multiple_of_what_the_bare_actor_
     hcpg, bare = (mean(row["return"] for row in found[2400, name]) for name in ("hcpg", "bare"))
     assert hcpg > 2 * bare
     assert successes(found[2400, "bare"]) == 0
+
+
+@pytest.mark.parametrize("preset", ["sac_flow_plain", "sac_flow_decoder"])
+def test_the_other_fields_learn_to_reach(preset, tmp_path):
+    learner = {**LEARNER, "decoder_hidden_size": 32}
+    found = trained("point/reach", preset, tmp_path, learner, steps=8000, evaluations=4)
+    curve = [successes(found[step, "bare"]) for step in (2000, 4000, 6000, 8000)]
+    assert curve[0] <= 5, curve  # of 20
+    assert max(curve[2:]) >= 15, curve

@@ -59,8 +59,18 @@ class Pool:
     timeout_s: float
     """How long an answer may take before a worker counts as hung."""
 
-    def __init__(self, task: str, seeds: Sequence[int], *, workers: int, timeout_s: float = 120.0) -> None:
-        """Start the workers and build environment e with `seeds[e]`.
+    def __init__(
+        self,
+        task: str,
+        seeds: Sequence[int],
+        *,
+        workers: int,
+        horizon: int | None = None,
+        timeout_s: float = 120.0,
+    ) -> None:
+        """Start the workers and build environment e with `seeds[e]`; episodes are cut after `horizon` steps.
+
+        Without a `horizon` they are cut where the task says.
 
         Raises:
             ValueError: no seeds, or less than one worker.
@@ -84,7 +94,7 @@ class Pool:
         try:
             for worker, share in enumerate(self._shares):
                 seeds_of = {int(index): self._seeds[index] for index in share}
-                self._crew.hire(Post(worker, task, seeds_of, sizes, memory.name))
+                self._crew.hire(Post(worker, task, seeds_of, sizes, memory.name, horizon or address.horizon))
             self._answers()
         except BaseException:
             self.close()

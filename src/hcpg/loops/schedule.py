@@ -78,6 +78,10 @@ def _check_ranges(budget: Budget, horizon: int) -> None:
             f"evaluation_episodes {budget.evaluation_episodes} must be at least 1",
         ),
         (
+            budget.training_horizon is not None and budget.training_horizon < 1,
+            f"training_horizon {budget.training_horizon} must be at least 1",
+        ),
+        (
             environments >= 1 and budget.evaluations > max(1, ceil(budget.steps / environments)),
             f"evaluations {budget.evaluations} must be at most one per step of {environments} environments",
         ),

@@ -60,7 +60,8 @@ class Trainer:
         task = registry.task(settings.task)
         self.settings, self.seeds, self.journal, self.workers = settings, seeds, journal, workers
         self.spec = registry.suite(task.suite).spec(task)
-        self.schedule = Schedule.of(settings.budget, task.horizon)
+        self._horizon = min(settings.budget.training_horizon or task.horizon, task.horizon)
+        self.schedule = Schedule.of(settings.budget, self._horizon)
         self.method = registry.method(settings.method).METHOD(settings.learner, self.spec)
         if settings.adapter not in task.adapters:
             raise registry.UnknownNameError("adapter", settings.adapter, sorted(task.adapters))
@@ -83,7 +84,7 @@ class Trainer:
     def pool(self) -> Pool:
         """The training environments: E of each run, with the run's own start states."""
         seeds = np.repeat(self.seeds, self.settings.budget.environments)
-        return Pool(self.settings.task, seeds.tolist(), workers=self.workers)
+        return Pool(self.settings.task, seeds.tolist(), workers=self.workers, horizon=self._horizon)
 
     def empty(self) -> tuple[Any, replay.Replay]:
         """Fresh states and an empty replay, which also serve as templates for a checkpoint."""

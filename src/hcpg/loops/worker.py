@@ -58,6 +58,8 @@ class Post(NamedTuple):
     sizes: Sizes
     memory: str
     """Name of the shared memory that holds the board."""
+    horizon: int
+    """Steps until an episode is cut."""
 
 
 def board_fields(sizes: Sizes) -> list[tuple[str, tuple[int, ...], type]]:
@@ -213,7 +215,7 @@ def _open_station(post: Post, board: Board) -> Station:
         board.busy[post.worker] = index
         environments[index] = suite.make(task, seed)
     board.busy[post.worker] = NOBODY
-    return Station(environments, task.horizon, board, post.worker)
+    return Station(environments, post.horizon, board, post.worker)
 
 
 def _leave_with_parent() -> None:
