@@ -105,7 +105,14 @@ def test_overrides_name_real_settings_of_real_budgets():
     for preset in PRESETS.values():
         known = {each.name for each in fields(registry.method(preset.method).Config)}
         assert set(preset.overrides) <= set(BUDGETS)
-        assert all(set(changes) <= known for changes in preset.overrides.values())
+        assert all(set(changes) <= known for changes in (preset.learner, *preset.overrides.values()))
+
+
+def test_what_a_budget_asks_for_goes_before_what_the_preset_is():
+    narrow = presets.settings("point/carry", "sac_crossq", "cpu").learner
+    wide = presets.settings("point/carry", "sac_crossq", "paper").learner
+    assert (narrow.critic, narrow.critic_hidden_size, narrow.discount) == ("crossq", 256, 0.97)
+    assert (wide.critic, wide.critic_hidden_size, wide.discount) == ("crossq", 1024, 0.99)
 
 
 def test_an_unknown_preset_or_budget_is_told_with_the_nearest():

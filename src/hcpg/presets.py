@@ -71,8 +71,10 @@ class Preset:
 
     method: str
     selector: Selector
+    learner: dict[str, Any] = field(default_factory=dict)
+    """The method's settings where they differ from its defaults, at every budget."""
     overrides: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """The method's settings by budget name, where they differ from its defaults."""
+    """Further ones by budget name, which go before `learner`."""
     evaluation_selector: Selector | None = None
     """The selector at evaluation, where it is another one."""
 
@@ -99,7 +101,9 @@ SAC_CROSSQ = {
     "policy_delay": 3,
     "initial_temperature": 0.2,
 }
-CPU_SAC_CROSSQ = {**SAC_CROSSQ, **CPU_DISCOUNT, "critic_hidden_size": 256, "actor_learning_rate": 1e-3}
+CPU_SAC_CROSSQ = {**CPU_DISCOUNT, "critic_hidden_size": 256, "actor_learning_rate": 1e-3}
+
+CPU_QSM = {**CPU_DISCOUNT, "actor_hidden_size": 256, "critic_hidden_size": 256}
 
 # The critics and rates of SAC-Flow's offline-to-online code, and no more of it: there is no offline phase, no
 # pull towards the data's actions and no action chunks here; the target takes the critics' minimum (there: the
@@ -131,13 +135,12 @@ HCPG, ALONE = Selector("hcpg", candidates=4), Selector("first", candidates=1)
 
 def _arm(selector: Selector, evaluation_selector: Selector | None = None) -> Preset:
     """SAC-Flow with another selector: a control that takes HCPG apart."""
-    return Preset("sac_flow", selector, {"cpu": CPU_SAC_FLOW}, evaluation_selector)
+    return Preset("sac_flow", selector, {}, {"cpu": CPU_SAC_FLOW}, evaluation_selector)
 
 
 def _field(velocity: str) -> Preset:
     """SAC-Flow with another velocity field, and nothing else changed."""
-    chosen = {"velocity": velocity}
-    return Preset("sac_flow", ALONE, {"paper": chosen, "cpu": {**CPU_SAC_FLOW, **chosen}})
+    return Preset("sac_flow", ALONE, {"velocity": velocity}, {"cpu": CPU_SAC_FLOW})
 
 
 ARMS = {
@@ -162,16 +165,12 @@ PRESETS = {
     **ARMS,
     "sac_flow_decoder": _field("decoder"),
     "sac_flow_plain": _field("plain"),
-    "sac_flow_polyak": Preset(
-        "sac_flow", ALONE, {"paper": SAC_FLOW_POLYAK, "cpu": {**SAC_FLOW_POLYAK, **CPU_SAC_FLOW}}
-    ),
-    "sac_flow_rlinf": Preset("sac_flow", ALONE, {"paper": SAC_FLOW_RLINF, "cpu": SAC_FLOW_RLINF}),
-    "flowrl": Preset("flowrl", ALONE, {"cpu": {**CPU_DISCOUNT, "hidden_size": 256}}),
-    "qsm": Preset(
-        "qsm", ALONE, {"cpu": {**CPU_DISCOUNT, "actor_hidden_size": 256, "critic_hidden_size": 256}}
-    ),
-    "sac": Preset("sac", ALONE, {"cpu": CPU_DISCOUNT}),
-    "sac_crossq": Preset("sac", ALONE, {"paper": SAC_CROSSQ, "cpu": CPU_SAC_CROSSQ}),
+    "sac_flow_polyak": Preset("sac_flow", ALONE, SAC_FLOW_POLYAK, {"cpu": CPU_SAC_FLOW}),
+    "sac_flow_rlinf": Preset("sac_flow", ALONE, SAC_FLOW_RLINF),
+    "flowrl": Preset("flowrl", ALONE, {}, {"cpu": {**CPU_DISCOUNT, "hidden_size": 256}}),
+    "qsm": Preset("qsm", ALONE, {}, {"cpu": CPU_QSM}),
+    "sac": Preset("sac", ALONE, {}, {"cpu": CPU_DISCOUNT}),
+    "sac_crossq": Preset("sac", ALONE, SAC_CROSSQ, {"cpu": CPU_SAC_CROSSQ}),
 }
 
 BUDGETS = {
@@ -213,7 +212,7 @@ def settings(task: str, preset: str = "hcpg_flow", budget: str = "cpu") -> Setti
         task=task,
         preset=preset,
         method=chosen.method,
-        learner=replace(config, **chosen.overrides.get(budget, {})),
+        learner=replace(config, **{**chosen.learner, **chosen.overrides.get(budget, {})}),
         selector=chosen.selector,
         evaluation_selector=chosen.evaluation_selector or chosen.selector,
         adapter="paper",
