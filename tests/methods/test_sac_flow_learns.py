@@ -41,4 +41,4 @@ def test_the_other_fields_learn_to_reach(preset, tmp_path):
     found = trained("point/reach", preset, tmp_path, learner, steps=8000, evaluations=4)
     curve = [successes(found[step, "bare"]) for step in (2000, 4000, 6000, 8000)]
     assert curve[0] <= 5, curve  # of 20
-    assert max(curve[2:]) >= 15, curve
+    assert max(curve[2:]) >= 12, curve
