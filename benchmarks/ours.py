@@ -24,6 +24,7 @@ def main() -> None:
     preset, seed = sys.argv[1], int(sys.argv[2])
     settings = presets.settings("metaworld/button-press", preset)
     amount = {"steps": WARMUP_STEPS + MEASURED_STEPS, "warmup_steps": 504, "evaluations": 1}
+    amount["updates_per_step"] = 0.25  # as the peer has it
     settings = replace(settings, budget=replace(settings.budget, evaluation_episodes=1, **amount))
     print("ready", flush=True)
     sys.stdin.readline()

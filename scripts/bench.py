@@ -56,6 +56,22 @@ def gradient_steps() -> list[tuple[str, float, str]]:
     ]
 
 
+METHODS = ("sac", "sac_crossq", "sac_flow", "sac_flow_plain", "sac_flow_decoder", "flowrl", "qsm")
+
+
+def methods() -> list[tuple[str, float, str]]:
+    """Each method's update against SAC's, in time and in operations."""
+    answers = {name: together([["method_step", name]], pinned=True)[0] for name in METHODS}
+    sac, rows = answers["sac"], []
+    for name, answer in answers.items():
+        work = answer["operations"] / sac["operations"]
+        rate = answer["operations"] / answer["seconds"] / 1e9
+        print(f"  {name}: {1e3 * answer['seconds']:.1f} ms, {answer['operations'] / 1e9:.2f} GFLOP", end=", ")
+        print(f"{rate:.0f} GFLOP/s")
+        rows.append((f"update of {name} / sac, time", answer["seconds"] / sac["seconds"], f"~ {work:.2f}"))
+    return rows
+
+
 def pool() -> list[tuple[str, float, str]]:
     """The pool against cores times one bare environment."""
     answer = _one("pool_rate")
@@ -125,7 +141,7 @@ def _one(module: str) -> dict:
     return json.loads(answer.stdout.strip().splitlines()[-1])
 
 
-PARTS = {part.__name__: part for part in (gradient_steps, pool, training, selection, memory)}
+PARTS = {part.__name__: part for part in (gradient_steps, methods, pool, training, selection, memory)}
 
 
 def main() -> None:
