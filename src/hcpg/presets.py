@@ -194,7 +194,6 @@ BUDGETS = {
         evaluations=12,
         evaluation_episodes=20,
         replay_capacity=200_000,
-        training_horizon=200,
     ),
 }
 
