@@ -97,9 +97,11 @@ class DecoderActor(FlowActor):
     """Flow-T: velocity and deviation from two decoder layers over one token.
 
     The noise is drawn in velocity space, so the sample's deviation is the network's over the number of
-    steps. Each step has its own norm of the sample; the layers' norms are shared. Deviation: the path
-    density counts that deviation; published, the term is missing, so that entropy has no slope by it, and
-    `density` brings that back.
+    steps. Each step has its own norm of the sample; the layers' norms are shared. All rows of a step have
+    the same time token, so in training the first norm takes it out until its correction starts after
+    100,000 calls, while in acting it counts, untrained. Deviation: the path density counts the noise's
+    deviation; published, the term is missing, so that entropy has no slope by it, and `density` brings that
+    back.
 
     Source: SAC-Flow, the velocity reparameterisation "Flow-T".
     """
