@@ -80,14 +80,16 @@ class Preset:
 
 
 # Chosen by measurement, see docs/decisions.md: with few updates the actor must learn faster than in the
-# official recipe, a high target entropy keeps it exploring until it knows the better of two ways, and a
-# shorter horizon lets the critics tell them apart early. The discount is the same for every method.
+# official recipe, a high target entropy and a temperature that falls slowly keep it exploring until it knows
+# the better of two ways, and a shorter horizon lets the critics tell them apart early. The discount is the
+# same for every method.
 CPU_DISCOUNT = {"discount": 0.97}
 CPU_SAC_FLOW = {
     **CPU_DISCOUNT,
     "actor_hidden_size": 256,
     "critic_hidden_size": 256,
     "actor_learning_rate": 1e-3,
+    "temperature_learning_rate": 3e-4,
     "target_entropy": 24.0,
 }
 
