@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from hcpg import presets, registry
-from hcpg.selection import RULES
+from hcpg.selection import RULES, Selector
 
 KINDS = ("methods", "selectors", "tasks", "presets", "budgets")
 
@@ -35,15 +35,26 @@ def _lines(kind: str) -> dict[str, str]:
     if kind == "tasks":
         return {name: f"adapters {', '.join(registry.task(name).adapters)}" for name in registry.task_names()}
     if kind == "presets":
-        return {
-            name: f"{preset.method} with selector {preset.selector.rule} (K = {preset.selector.candidates})"
-            for name, preset in presets.PRESETS.items()
-        }
+        return {name: _pair(preset) for name, preset in presets.PRESETS.items()}
     return {
         name: f"{budget.steps:,} steps, {budget.environments} environments, "
         f"{budget.updates_per_step:g} updates per step, batch {budget.batch_size}"
         for name, budget in presets.BUDGETS.items()
     }
+
+
+def _pair(preset: presets.Preset) -> str:
+    """The method, and what selects while it trains and while it is evaluated."""
+    at_evaluation = preset.evaluation_selector
+    evaluated = "" if at_evaluation is None else f", evaluated {_selection(at_evaluation)}"
+    return f"{preset.method} {_selection(preset.selector)}{evaluated}"
+
+
+def _selection(selector: Selector) -> str:
+    if selector.alone:
+        return "alone"
+    towards = "" if selector.direction == "scene" else f", {selector.direction} directions"
+    return f"with selector {selector.rule} (K = {selector.candidates}{towards})"
 
 
 def _summary(module: str) -> str:
