@@ -24,8 +24,6 @@ ONE_PER_READING = (
 )
 # The object's quaternion where it lies untilted at the start; the scalar's place differs between tasks.
 ROOT = Path(__file__).parents[2]
-# The package's experts command more than the box allows, and say so.
-pytestmark = pytest.mark.filterwarnings("ignore:Constant.* may be too high")
 
 
 def observation_of(hand, item, goal, opening=1.0, quaternion=(0.0, 0.0, 0.0, 1.0)):
