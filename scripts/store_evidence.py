@@ -1,7 +1,8 @@
-"""Keep runs as evidence: curves, table, and each run's settings and raw rows, compressed.
+"""Keep runs as evidence: table, and each run's settings and raw rows, compressed.
 
-Usage: store_evidence.py FOLDER RUNS... ; RUNS are run folders or folders of them. What is written is small
-enough for the repository, and free of this machine's paths.
+Usage: store_evidence.py FOLDER RUNS... ; RUNS are run folders or folders of them. Runs of a preset are seeds
+of one experiment, shown with their curves; with --pilots every run stands for itself, whatever its settings.
+What is written is small enough for the repository, and free of this machine's paths.
 """
 
 import argparse
@@ -10,12 +11,20 @@ import json
 import shutil
 from pathlib import Path
 
+from hcpg import presets
+from hcpg.commands import options
 from hcpg.report.figures import learning_curves
-from hcpg.report.records import Group, Record, load_runs
-from hcpg.report.tables import markdown
+from hcpg.report.records import BARE, Group, Record, find_runs, load_run, load_runs
+from hcpg.report.tables import aligned, markdown
 
 PACKAGES = ("python", "jax", "jaxlib", "equinox", "optax", "numpy", "mujoco", "metaworld")
 TABLES = ("episodes.jsonl", "metrics.jsonl")
+PILOTS = """# Pilot runs
+
+Each row is `hcpg train --task TASK --preset PRESET --seeds SEED` with the options given, which are those
+that differ from the preset and its budget of today. Success of every evaluation, in percent, in the order of
+training; a run that has fewer than its budget names was stopped.
+"""
 
 
 def main() -> None:
@@ -23,26 +32,73 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("runs", type=Path, nargs="+")
-    options = parser.parse_args()
-    options.folder.mkdir(parents=True)
-    groups = load_runs(options.runs)
-    learning_curves(groups, options.folder / "learning_curves")
-    (options.folder / "README.md").write_text(f"{commands(groups)}\n{markdown(groups)}")
+    parser.add_argument("--pilots", action="store_true", help="a row per run, no curves")
+    asked = parser.parse_args()
+    asked.folder.mkdir(parents=True)
+    (store_pilots if asked.pilots else store_groups)(asked.folder, asked.runs)
+
+
+def store_groups(folder: Path, roots: list[Path]) -> None:
+    """The seeds of each preset together."""
+    groups = load_runs(roots)
+    learning_curves(groups, folder / "learning_curves")
+    (folder / "README.md").write_text(f"{commands(groups)}\n{markdown(groups)}")
     for run in (run for group in groups for run in group.runs):
-        store(run, options.folder / "runs" / run.preset / f"s{run.seed}")
+        several = len({group.task for group in groups}) > 1
+        store(
+            run,
+            folder / "runs" / (run.task.replace("/", "-") if several else "") / run.preset / f"s{run.seed}",
+        )
 
 
 def commands(groups: list[Group]) -> str:
-    """The command that makes each group again; the settings it resolves to are beside each run."""
+    """The command that makes each group again.
+
+    Raises:
+        SystemExit: the seeds of a preset differ in more than the seed.
+    """
     lines = ["# Evidence", "", "```sh"]
     for group in groups:
+        distinct = {" ".join(settings_of(run)) for run in group.runs}
+        if len(distinct) > 1:
+            raise SystemExit(f"{group.preset} on {group.task}: its seeds have different settings: {distinct}")
         seeds = " ".join(str(run.seed) for run in group.runs)
-        budget = json.loads((group.runs[0].path / "config.json").read_text())["budget"]
         lines.append(
-            f"hcpg train --task {group.task} --preset {group.preset} --budget {budget['name']} "
-            f"--steps {budget['steps']} --seeds {seeds}"
+            f"hcpg train --task {group.task} --preset {group.preset} {distinct.pop()} --seeds {seeds}"
         )
     return "\n".join([*lines, "```", ""])
+
+
+def settings_of(run: Record) -> list[str]:
+    """Budget, steps, and whatever else is not as the preset has it."""
+    settings = presets.from_json(json.loads((run.path / "config.json").read_text()))
+    budget = ["--budget", settings.budget.name, "--steps", str(settings.budget.steps)]
+    others = options.differences(settings)
+    if "--budget.steps" in others:
+        place = others.index("--budget.steps")
+        del others[place : place + 2]
+    return budget + others
+
+
+def store_pilots(folder: Path, roots: list[Path]) -> None:
+    """Every run that was evaluated at least once, by itself."""
+    runs = [load_run(path) for root in roots for path in find_runs(root)]
+    runs = [run for run in runs if run.curves]
+    rows = sorted(
+        [run.task, run.preset, " ".join(settings_of(run)), str(run.seed), *curves(run)] for run in runs
+    )
+    heading = ["task", "preset", "options", "seed", "with the selector", "bare"]
+    (folder / "README.md").write_text(f"{PILOTS}\n{aligned([heading, *rows])}\n")
+    for run in runs:
+        store(run, folder / "runs" / run.path.name)
+
+
+def curves(run: Record) -> list[str]:
+    """Success with the selector and bare."""
+    return [
+        " ".join(f"{100 * rate:.0f}" for rate in run.curves[name].rates) if name in run.curves else "-"
+        for name in (run.selector, BARE)
+    ]
 
 
 def store(run: Record, folder: Path) -> None:

@@ -37,14 +37,19 @@ class Method(Protocol):
         """The method's own evaluation action, in [-1, 1]."""
         ...
 
+    def update(self, state: Any, batch: Batch, key: Tensor) -> tuple[Any, Metrics]:
+        """One learning step on a batch of B transitions; it never sees a selector."""
+        ...
+
+
+@runtime_checkable
+class Valued(Protocol):
+    """What a method with a critic offers too; selectors that rank by value need it."""
+
     def value(
         self, state: Any, observation: Float[Tensor, " O"], actions: Float[Tensor, "K A"]
     ) -> Float[Tensor, " K"]:
         """The pessimistic critic's value of each action."""
-        ...
-
-    def update(self, state: Any, batch: Batch, key: Tensor) -> tuple[Any, Metrics]:
-        """One learning step on a batch of B transitions; it never sees a selector."""
         ...
 
 

@@ -4,7 +4,19 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from hcpg import registry
-from hcpg.selection import Selector
+from hcpg.interfaces import Valued
+from hcpg.selection import RULES, Selector
+
+
+class UnservedSelectorError(ValueError):
+    """A selector that asks a method for what it does not have."""
+
+    def __init__(self, method: str, rule: str) -> None:
+        others = ", ".join(name for name, each in RULES.items() if not each.needs_values)
+        super().__init__(
+            f"the selector {rule!r} ranks proposals by a critic's value, and the method {method!r} has no "
+            f"critic (its METHOD defines no `value`). Choose another method or one of: {others}."
+        )
 
 
 @dataclass(frozen=True)
@@ -219,6 +231,17 @@ def settings(task: str, preset: str = "hcpg_flow", budget: str = "cpu") -> Setti
         adapter="paper",
         budget=amount,
     )
+
+
+def refuse_unserved(settings: Settings) -> None:
+    """Check that the method can serve what both selectors ask for.
+
+    Raises:
+        UnservedSelectorError: a selector ranks by value, and the method has no critic.
+    """
+    for selector in (settings.selector, settings.evaluation_selector):
+        if selector.needs_values and not issubclass(registry.method(settings.method).METHOD, Valued):
+            raise UnservedSelectorError(settings.method, selector.rule)
 
 
 def _known(kind: str, name: str, table: dict[str, Any]) -> Any:

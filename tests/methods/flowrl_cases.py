@@ -5,15 +5,15 @@ from functools import cache
 
 import equinox as eqx
 import jax
-import numpy as np
-from jax import numpy as jnp
+from one_update import move, transitions
 
 from hcpg.methods.flowrl import Config, FlowRL
-from hcpg.types import Batch, Spec
+from hcpg.types import Spec
 
 ROWS, OBSERVATIONS, ACTIONS = 8, 5, 3
 # Steps so large that a value from before an update cannot be taken for the one from after it.
 TINY = Config(hidden_size=8, flow_steps=2, learning_rate=1e-2)
+BATCH = transitions(ROWS, OBSERVATIONS, ACTIONS)
 
 
 @cache
@@ -30,25 +30,10 @@ def update_of(weighting):
 def moved_state():
     """A state whose every parameter is off its start, so that none can be left out unnoticed."""
 
-    def move(tree, seed):
-        leaves, structure = jax.tree.flatten(tree)
-        generator = np.random.default_rng(seed)
-        shifted = [leaf + 0.2 * generator.normal(size=leaf.shape).astype(np.float32) for leaf in leaves]
-        return jax.tree.unflatten(structure, shifted)
-
     state = jax.jit(method_of("as_published").init)(jax.random.key(0))
     networks = state.actor, state.critic, state.buffer_critic, state.buffer_value
-    actor, critic, buffer_critic, value = (move(each, seed) for seed, each in enumerate(networks))
+    actor, critic, buffer_critic, value = (move(each, seed, by=0.2) for seed, each in enumerate(networks))
     return state._replace(actor=actor, critic=critic, buffer_critic=buffer_critic, buffer_value=value)
-
-
-@cache
-def transitions():
-    generator = np.random.default_rng(6)
-    rows = [generator.normal(size=(ROWS, OBSERVATIONS)), generator.uniform(-1, 1, (ROWS, ACTIONS))]
-    rows += [generator.normal(size=ROWS), generator.normal(size=(ROWS, OBSERVATIONS))]
-    rows += [np.arange(ROWS) % 4 == 0]
-    return Batch(*(jnp.asarray(each, jnp.float32) for each in rows))
 
 
 def answering(network, answer):

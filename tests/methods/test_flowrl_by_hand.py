@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from flowrl_cases import (
     ACTIONS,
+    BATCH,
     OBSERVATIONS,
     ROWS,
     answering,
     method_of,
     moved_state,
-    transitions,
     update_of,
 )
 from jax import numpy as jnp
@@ -57,7 +57,7 @@ def test_weights_pass_no_gradient():
 def test_four_updates_train_the_critics_and_the_value_four_times_and_the_policy_twice():
     state = moved_state()
     for index in range(4):
-        state, _ = update_of("as_published")(state, transitions(), jax.random.key(index))
+        state, _ = update_of("as_published")(state, BATCH, jax.random.key(index))
     optimizers = (
         state.critic_optimizer,
         state.buffer_critic_optimizer,
@@ -75,7 +75,7 @@ def test_the_buffer_critic_bootstraps_from_the_online_value_and_a_terminal_row_f
         buffer_critic=state.buffer_critic._replace(online=online),
         buffer_value=answering(state.buffer_value, 10.0),
     )
-    batch = transitions()._replace(rewards=jnp.full(ROWS, 1.0), terminated=jnp.arange(ROWS) < ROWS / 2)
+    batch = BATCH._replace(rewards=jnp.full(ROWS, 1.0), terminated=jnp.arange(ROWS) < ROWS / 2)
     batch = batch._replace(terminated=batch.terminated.astype(jnp.float32))
     _, metrics = update_of("as_published")(state, batch, jax.random.key(0))
     # Targets: 1 where the episode ended, 1 + 0.99 * 10 elsewhere; both critics say 2.
@@ -91,7 +91,7 @@ def test_the_value_regresses_on_the_smaller_target_of_the_buffer_critics():
         buffer_critic=state.buffer_critic._replace(target=target),
         buffer_value=answering(state.buffer_value, 1.0),
     )
-    _, metrics = update_of("as_published")(state, transitions(), jax.random.key(0))
+    _, metrics = update_of("as_published")(state, BATCH, jax.random.key(0))
     np.testing.assert_allclose(metrics["buffer_value_loss"], 0.9 * (3 - 1) ** 2, rtol=1e-5)
 
 
@@ -101,7 +101,7 @@ def test_the_policy_critic_bootstraps_from_the_smaller_target_without_entropy():
         online=answering(state.critic.online, 0.0),
         target=answering(state.critic.target, jnp.array([[5.0], [3.0]])),
     )
-    batch = transitions()._replace(rewards=jnp.ones(ROWS), terminated=jnp.zeros(ROWS))
+    batch = BATCH._replace(rewards=jnp.ones(ROWS), terminated=jnp.zeros(ROWS))
     _, metrics = update_of("as_published")(state._replace(critic=critic), batch, jax.random.key(0))
     np.testing.assert_allclose(metrics["critic_loss"], 2 * (1 + 0.99 * 3) ** 2, rtol=1e-5)
 
@@ -117,7 +117,7 @@ def still():
 
 def test_proposals_start_at_clamped_noise_and_go_through_tanh_once(still):
     propose = jax.jit(method_of("as_published").propose, static_argnums=3)
-    found = propose(still, transitions().observations[0], jax.random.key(3), 20_000)
+    found = propose(still, BATCH.observations[0], jax.random.key(3), 20_000)
     assert found.shape == (20_000, ACTIONS)
     np.testing.assert_allclose([found.min(), found.max()], [-0.7615942, 0.7615942], rtol=1e-6)
     on_the_bounds = (abs(found) > 0.76159).mean()
@@ -141,7 +141,7 @@ def test_the_anchors_lines_start_at_clamped_noise_too(still):
 
 
 def test_the_evaluation_action_is_the_single_proposal_bit_for_bit():
-    method, state, observation = method_of("as_published"), moved_state(), transitions().observations[0]
+    method, state, observation = method_of("as_published"), moved_state(), BATCH.observations[0]
     act, propose = jax.jit(method.act), jax.jit(method.propose, static_argnums=3)
     key = jax.random.key(4)
     np.testing.assert_array_equal(act(state, observation, key), propose(state, observation, key, 1)[0])
@@ -152,7 +152,7 @@ def test_the_value_is_the_smaller_policy_critics():
     state = moved_state()
     critic = state.critic._replace(online=answering(state.critic.online, jnp.array([[5.0], [3.0]])))
     found = method_of("as_published").value(
-        state._replace(critic=critic), transitions().observations[0], transitions().actions
+        state._replace(critic=critic), BATCH.observations[0], BATCH.actions
     )
     assert found.tolist() == [3.0] * ROWS
 

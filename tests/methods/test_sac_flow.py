@@ -11,6 +11,7 @@ import pytest
 import torch_fields
 import torch_sac_flow
 from jax import numpy as jnp
+from one_update import assert_learned_alike, gradient_of, move, transitions
 from scipy import stats
 
 from hcpg.methods.sac_flow import POLICY_METRICS, Config, SACFlow, State
@@ -27,6 +28,8 @@ VARIANTS = {
     "plain": {"velocity": "plain"},
     "decoder": {"velocity": "decoder", "flow_steps": 2},
 }
+BATCH = transitions(ROWS, OBSERVATIONS, ACTIONS)
+BETA_1 = 0.5
 
 
 class Case(NamedTuple):
@@ -56,12 +59,6 @@ def update_of(variant):
 def moved_state(variant):
     """A state whose every parameter is off its start, so that none can be left out unnoticed."""
 
-    def move(tree, seed):
-        leaves, structure = jax.tree.flatten(tree)
-        generator = np.random.default_rng(seed)
-        shifted = [leaf + 0.1 * generator.normal(size=leaf.shape).astype(np.float32) for leaf in leaves]
-        return jax.tree.unflatten(structure, shifted)
-
     def watched(moments):
         generator = np.random.default_rng(moments.mean.size)
         spread = jnp.asarray(generator.uniform(0.5, 2.0, moments.mean.shape), jnp.float32)
@@ -81,49 +78,21 @@ def moved_state(variant):
     )
 
 
-@cache
-def transitions():
-    generator = np.random.default_rng(6)
-    rows = [generator.normal(size=(ROWS, OBSERVATIONS)), generator.uniform(-1, 1, (ROWS, ACTIONS))]
-    rows += [generator.normal(size=ROWS), generator.normal(size=(ROWS, OBSERVATIONS))]
-    rows += [np.arange(ROWS) % 4 == 0]
-    return Batch(*(jnp.asarray(each, jnp.float32) for each in rows))
-
-
 @pytest.fixture(scope="module", params=VARIANTS)
 def case(request):
     before = moved_state(request.param)._replace(updates=jnp.int32(2))  # the third update: the actor is due
     key = jax.random.key(9)
-    after, metrics = update_of(request.param)(before, transitions(), key)
+    after, metrics = update_of(request.param)(before, BATCH, key)
     steps = method_of(request.param).config.flow_steps
     noises = tuple(Noise.draw(each, (ROWS, ACTIONS), steps) for each in jax.random.split(key))
-    return Case(method_of(request.param), before, after, metrics, transitions(), noises, request.param)
-
-
-def gradient_of(optimizer_state):
-    """Adam's first moment after one step is (1 - beta 1) = one half of the gradient."""
-    return [2 * np.asarray(leaf) for leaf in jax.tree.leaves(optimizer_state[0].mu)]
-
-
-def assert_learned_alike(parameters, optimizer_state, reference, share=0.7):
-    """Gradients, and the parameters wherever the gradient is not so small that Adam's step is its noise."""
-    compared = 0
-    gradients = gradient_of(optimizer_state)
-    for own, slope, expected, expected_slope in zip(
-        jax.tree.leaves(parameters), gradients, reference.parameters, reference.gradient, strict=True
-    ):
-        np.testing.assert_allclose(slope, expected_slope, rtol=1e-4, atol=1e-5)
-        clear = np.abs(expected_slope) > 1e-4
-        np.testing.assert_allclose(np.asarray(own)[clear], expected[clear], atol=1e-5)
-        compared += clear.sum() / clear.size
-    assert compared / len(gradients) > share
+    return Case(method_of(request.param), before, after, metrics, BATCH, noises, request.param)
 
 
 def test_the_critic_update_equals_the_one_in_torch(case):
     reference = torch_sac_flow.critic_update(case.method.config, case.before, case.batch, case.noises[0])
     np.testing.assert_allclose(case.metrics["critic_loss"], reference.loss, rtol=1e-5)
     np.testing.assert_allclose(case.metrics["value"], reference.extra["value"], rtol=1e-4, atol=1e-6)
-    assert_learned_alike(case.after.critic.networks, case.after.critic_optimizer, reference)
+    assert_learned_alike(case.after.critic.networks, case.after.critic_optimizer, reference, beta_1=BETA_1)
     moments = case.after.critic.moments
     if case.method.config.critic == "polyak":
         pairs = [(moments, reference.extra["statistics"])]
@@ -145,7 +114,7 @@ def test_the_actor_update_equals_the_one_in_torch(case):
     np.testing.assert_allclose(case.metrics["actor_gradient"], norm, rtol=1e-4)
     # A bias or a time before a norm has no gradient: that leaves 35 of the decoder's 58 arrays.
     share = 0.5 if case.method.config.velocity == "decoder" else 0.7
-    assert_learned_alike(case.after.actor, case.after.actor_optimizer, reference, share)
+    assert_learned_alike(case.after.actor, case.after.actor_optimizer, reference, beta_1=BETA_1, share=share)
     for place, (mean, variance) in reference.extra["statistics"].items():
         moments = torch_fields.at(case.after.actor_moments, place)
         np.testing.assert_allclose(moments.mean, mean, atol=1e-5)
@@ -183,7 +152,9 @@ def test_the_path_density_is_that_of_its_gaussian_steps(case):
 
 def test_the_temperature_falls_by_one_step_while_the_entropy_exceeds_its_target(case):
     surplus = float(case.metrics["path_entropy"])
-    np.testing.assert_allclose(gradient_of(case.after.temperature_optimizer), [0.2 * surplus], rtol=1e-4)
+    np.testing.assert_allclose(
+        gradient_of(case.after.temperature_optimizer, BETA_1), [0.2 * surplus], rtol=1e-4
+    )
     step = float(case.after.log_temperature - case.before.log_temperature)
     np.testing.assert_allclose(step, -np.sign(surplus) * 1e-3, rtol=1e-3)
     np.testing.assert_allclose(case.metrics["temperature"], 0.2 * np.exp(step), rtol=1e-5)
@@ -216,7 +187,7 @@ def test_three_updates_train_the_critics_thrice_and_actor_and_temperature_once()
     state = moved_state("crossq")
     first = state.critic.networks.layers[2].bias
     for index in range(3):
-        state, metrics = update_of("crossq")(state, transitions(), jax.random.key(index))
+        state, metrics = update_of("crossq")(state, BATCH, jax.random.key(index))
         if index == 0:
             steps = state.critic.networks.layers[2].bias - first
             np.testing.assert_allclose(abs(steps), np.full((2, 1), 1e-3), rtol=1e-3)
@@ -248,7 +219,7 @@ def pairs():
     """2000 times two proposals for one observation."""
     method, state = method_of("crossq"), moved_state("crossq")
     keys = jax.random.split(jax.random.key(3), 2000)
-    observation = transitions().observations[0]
+    observation = BATCH.observations[0]
     return jax.jit(jax.vmap(lambda key: method.propose(state, observation, key, 2)))(keys)
 
 
@@ -263,7 +234,7 @@ def test_proposals_of_one_set_are_independent_and_alike_in_distribution(pairs):
 
 
 def test_the_evaluation_action_is_the_single_proposal_bit_for_bit():
-    method, state, observation = method_of("crossq"), moved_state("crossq"), transitions().observations[0]
+    method, state, observation = method_of("crossq"), moved_state("crossq"), BATCH.observations[0]
     act, propose = jax.jit(method.act), jax.jit(method.propose, static_argnums=3)
     key = jax.random.key(4)
     np.testing.assert_array_equal(act(state, observation, key), propose(state, observation, key, 1)[0])

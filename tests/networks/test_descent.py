@@ -1,10 +1,20 @@
 """One gradient step: Adam's first one has the length of the learning rate, whatever the slope."""
 
+from typing import NamedTuple
+
+import jax
 import numpy as np
 import optax
 from jax import numpy as jnp
 
-from hcpg.networks.descent import descend, follow
+from hcpg.networks.descent import count_update, descend, follow
+
+
+class Counted(NamedTuple):
+    """A state that notes at which updates it was improved."""
+
+    updates: jax.Array
+    improved: jax.Array
 
 
 def test_adams_first_step_is_the_learning_rate_against_the_sign():
@@ -25,3 +35,15 @@ def test_the_second_step_remembers_the_first():
 def test_a_follower_moves_by_its_rate_towards_what_it_follows():
     found = follow({"a": jnp.array([1.0, 0.0])}, {"a": jnp.array([0.0, 2.0])}, 0.95)
     np.testing.assert_allclose(found["a"], [0.05, 1.9], rtol=1e-6)
+
+
+def test_every_third_update_improves_the_counted_state_and_the_others_report_nothing():
+    def improve(state):
+        return state._replace(improved=10 * state.improved + state.updates), {"loss": jnp.float32(2.0)}
+
+    state, losses = Counted(jnp.int32(0), jnp.int32(0)), []
+    for _ in range(6):
+        state, metrics = jax.jit(lambda state: count_update(state, 3, improve, ("loss",)))(state)
+        losses.append(float(metrics["loss"]))
+    assert (int(state.updates), int(state.improved)) == (6, 36)
+    np.testing.assert_array_equal(losses, [np.nan, np.nan, 2.0, np.nan, np.nan, 2.0])

@@ -8,7 +8,12 @@ from jax import numpy as jnp
 
 from hcpg.networks.critics import Target
 from hcpg.networks.dense import Dense
-from hcpg.networks.maximum_entropy import improve_critics, improve_temperature, pessimistic_values
+from hcpg.networks.maximum_entropy import (
+    improve_critics,
+    improve_temperature,
+    pessimistic_values,
+    soft_target,
+)
 from hcpg.networks.mlp import MLP
 from hcpg.networks.plain_critics import Plain
 from hcpg.types import Batch
@@ -52,3 +57,12 @@ def test_the_temperature_rises_while_the_entropy_is_below_its_target(surplus, ch
     descent, start = optax.sgd(0.1), jnp.log(2.0)
     after, _ = improve_temperature(start, jnp.asarray(surplus), descent, descent.init(start))
     np.testing.assert_allclose(after - start, change, atol=1e-5)
+
+
+def test_a_likely_action_adds_less_to_the_target_than_an_unlikely_one():
+    """Temperature 2: log-probabilities of 1 and -3 nats add -2 and 6."""
+    actions = jnp.array([[0.1], [0.2]])
+    target = soft_target(actions, jnp.array([1.0, -3.0]), jnp.log(2.0), 0.9)
+    np.testing.assert_allclose(target.entropy_bonus, [-2.0, 6.0], rtol=1e-6)
+    assert target.actions is actions
+    assert target.discount == 0.9

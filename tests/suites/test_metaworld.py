@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from trajectories import actions_of, trajectory
 
 from hcpg import registry
 from hcpg.interfaces import Task
@@ -25,18 +26,6 @@ def drawer():
     environment = suite.SUITE.make(DRAWER, seed=0)
     yield environment
     environment.close()
-
-
-def actions_of(seed, count):
-    return np.random.default_rng(seed).uniform(-1, 1, (count, 4)).astype(np.float32)
-
-
-def trajectory(environment, start, actions):
-    rows = [np.append(environment.reset(start), [0.0, 0.0])]
-    for action in actions:
-        step = environment.step(action)
-        rows.append(np.append(step.observation, [step.reward, step.success]))
-    return np.asarray(rows)
 
 
 def test_sizes_are_known_and_nothing_heavy_is_imported_for_them():

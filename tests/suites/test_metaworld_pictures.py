@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from trajectories import actions_of, trajectory
 
 from hcpg import registry
 from hcpg.suites import metaworld as suite
@@ -23,18 +24,6 @@ def can_draw():
     except OSError:
         return False
     return True
-
-
-def actions_of(seed, count):
-    return np.random.default_rng(seed).uniform(-1, 1, (count, 4)).astype(np.float32)
-
-
-def trajectory(environment, start, actions):
-    rows = [np.append(environment.reset(start), [0.0, 0.0])]
-    for action in actions:
-        step = environment.step(action)
-        rows.append(np.append(step.observation, [step.reward, step.success]))
-    return np.asarray(rows)
 
 
 @pytest.mark.skipif(not can_draw(), reason="needs libegl1")

@@ -1,13 +1,13 @@
 """From observations to executed actions: propose, see the scene, select. One jitted call."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import jax
 from jax import numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from hcpg.interfaces import Method, ReadScene
+from hcpg.interfaces import Method, ReadScene, Valued
 from hcpg.loops.runs_axis import axes_of, over_runs
 from hcpg.selection import Diagnostics, Selector, select
 
@@ -24,6 +24,8 @@ def guided(method: Method, selector: Selector, read_scene: ReadScene) -> Callabl
 
     Source: paper, algorithm 1, lines 1 to 7.
     """
+    if selector.needs_values and not isinstance(method, Valued):
+        raise TypeError(f"the selector {selector.rule!r} needs a method with `value`, got {method!r}")
 
     def one(state: Any, observation: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> tuple:
         proposals = method.propose(state, observation, key, selector.candidates)
@@ -31,7 +33,7 @@ def guided(method: Method, selector: Selector, read_scene: ReadScene) -> Callabl
         if selector.needs_noise:
             extra["noise"] = jax.random.uniform(luck, (selector.candidates,))
         if selector.needs_values:
-            extra["values"] = method.value(state, observation, proposals)
+            extra["values"] = cast("Valued", method).value(state, observation, proposals)
         return select(proposals, read_scene(observation), selector, **extra)
 
     def every(state: Any, observations: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> Chosen:

@@ -57,6 +57,7 @@ def load(path: Path, choice: Choice) -> Trained:
         RunFolderError: there is no run.
         CheckpointError: it has no such checkpoint, or a damaged one.
         UnknownNameError: no rule or adapter has the name.
+        UnservedSelectorError: the rule needs a critic that the method does not have.
     """
     folder = RunFolder.open(path)
     settings = presets.from_json(folder.config())
@@ -66,6 +67,7 @@ def load(path: Path, choice: Choice) -> Trained:
         raise UnknownNameError("adapter", adapter, sorted(task.adapters))
     selector = _selector(settings.evaluation_selector, choice)
     settings = replace(settings, adapter=adapter, evaluation_selector=selector)
+    presets.refuse_unserved(settings)
     method = registry.method(settings.method).METHOD(settings.learner, registry.suite(task.suite).spec(task))
     seed = seed_of(folder)
     step = choice.step if choice.step is not None or path.name[:5] != "step_" else step_of(path)

@@ -9,7 +9,7 @@ from jax import numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from hcpg.interfaces import Metrics
-from hcpg.networks.descent import descend, follow, rest
+from hcpg.networks.descent import count_update, descend, follow, rest
 from hcpg.networks.layer_norm import LayerNormMLP, value_tower
 from hcpg.networks.midpoint import MidpointFlow, clamped_normal
 from hcpg.networks.mlp import ensemble, evaluate
@@ -145,12 +145,11 @@ class FlowRL:
         state, of_critic = self._improve_critic(state, batch, of_target)
         state, replayed, of_buffer = self._improve_buffer_critic(state, batch)
         state, of_value = self._improve_buffer_value(state, batch)
-        state = state._replace(updates=state.updates + 1)
-        due = state.updates % self.config.policy_delay == 0
-        state, delayed = jax.lax.cond(
-            due,
-            lambda: self._improve_policy(state, batch, replayed, of_policy),
-            lambda: (state, dict.fromkeys(POLICY_METRICS, jnp.float32(jnp.nan))),
+        state, delayed = count_update(
+            state,
+            self.config.policy_delay,
+            lambda state: self._improve_policy(state, batch, replayed, of_policy),
+            POLICY_METRICS,
         )
         return state, {**of_critic, **of_buffer, **of_value, **delayed}
 

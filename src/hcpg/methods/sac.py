@@ -9,10 +9,15 @@ from jax import numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from hcpg.interfaces import Metrics
-from hcpg.networks.critics import Critics, CriticState, CrossQ, Target
-from hcpg.networks.descent import descend, rest
+from hcpg.networks.critics import Critics, CriticState, CrossQ
+from hcpg.networks.descent import count_update, descend, rest
 from hcpg.networks.gaussian import GaussianActor
-from hcpg.networks.maximum_entropy import improve_critics, improve_temperature, pessimistic_values
+from hcpg.networks.maximum_entropy import (
+    improve_critics,
+    improve_temperature,
+    pessimistic_values,
+    soft_target,
+)
 from hcpg.networks.plain_critics import Plain
 from hcpg.types import Batch, Sampling, Spec
 
@@ -124,12 +129,11 @@ class SAC:
         """Improve the critics; every `policy_delay`-th time the actor and the temperature too."""
         of_target, of_actor = jax.random.split(key)
         state, metrics = self._improve_critics(state, batch, of_target)
-        state = state._replace(updates=state.updates + 1)
-        due = state.updates % self.config.policy_delay == 0
-        state, of_policy = jax.lax.cond(
-            due,
-            lambda: self._improve_policy(state, batch, of_actor),
-            lambda: (state, dict.fromkeys(POLICY_METRICS, jnp.float32(jnp.nan))),
+        state, of_policy = count_update(
+            state,
+            self.config.policy_delay,
+            lambda state: self._improve_policy(state, batch, of_actor),
+            POLICY_METRICS,
         )
         return state, {**metrics, **of_policy, "temperature": jnp.exp(state.log_temperature)}
 
@@ -138,8 +142,7 @@ class SAC:
     ) -> tuple[State, dict[str, Array]]:
         noise = jax.random.normal(key, batch.actions.shape)
         sample = state.actor(batch.next_observations).sample(noise)
-        bonus = -jnp.exp(state.log_temperature) * sample.log_prob
-        following = Target(sample.actions, bonus, self.config.discount)
+        following = soft_target(sample.actions, sample.log_prob, state.log_temperature, self.config.discount)
         adam = self._adam(self.config.critic_learning_rate)
         critic, optimizer, metrics = improve_critics(
             self.critics, state.critic, batch, following, adam, state.critic_optimizer

@@ -10,6 +10,19 @@ from hcpg.networks.descent import descend
 from hcpg.types import Batch
 
 
+def soft_target(
+    actions: Float[Array, "B A"],
+    log_prob: Float[Array, " B"],
+    log_temperature: Float[Array, ""],
+    discount: float,
+) -> Target:
+    """What the next state's actions add to the Bellman target: their value and their entropy.
+
+    `log_prob` is theirs or, of a flow, their path's; nats.
+    """
+    return Target(actions, -jnp.exp(log_temperature) * log_prob, discount)
+
+
 def improve_critics(
     recipe: Critics,
     state: CriticState,

@@ -40,10 +40,11 @@ def _table(groups: Sequence[Group]) -> str:
     }
     lines = [["", *(group.preset for group in groups)]]
     lines += [[name, *(cell(group) for group in groups)] for name, cell in rows.items()]
-    return _aligned(lines)
+    return aligned(lines)
 
 
-def _aligned(lines: Sequence[Sequence[str]]) -> str:
+def aligned(lines: Sequence[Sequence[str]]) -> str:
+    """A Markdown table whose first line is its heading; the columns are equally wide in plain text, too."""
     widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
     texts = [
         "| " + " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)) + " |"
