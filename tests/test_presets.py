@@ -2,11 +2,12 @@
 
 import json
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import pytest
 
 from hcpg import presets, registry
-from hcpg.presets import ARMS, BUDGETS, PRESETS
+from hcpg.presets import ARMS, BUDGETS, PRESETS, UnservedSelectorError
 from hcpg.registry import UnknownNameError
 from hcpg.selection import Selector
 
@@ -120,3 +121,16 @@ def test_an_unknown_preset_or_budget_is_told_with_the_nearest():
         presets.settings("point/carry", "hcpg_flo")
     with pytest.raises(UnknownNameError, match=r"no budget is named 'gpu'.* Known: .*cpu, .*paper"):
         presets.settings("point/carry", "hcpg_flow", "gpu")
+
+
+@pytest.mark.parametrize("part", ["selector", "evaluation_selector"])
+def test_a_selector_that_ranks_by_value_is_refused_for_a_method_without_critic(part, monkeypatch):
+    settings = presets.settings("point/carry", "mean")
+    asking = replace(settings, **{part: Selector("value_soft")})
+    presets.refuse_unserved(asking)
+    monkeypatch.setattr(registry, "method", lambda _: SimpleNamespace(METHOD=type("Cloned", (), {})))
+    presets.refuse_unserved(settings)
+    with pytest.raises(
+        UnservedSelectorError, match=r"'value_soft' .* 'sac_flow' has no .* hcpg, first, mean"
+    ):
+        presets.refuse_unserved(asking)

@@ -44,7 +44,7 @@ class Follower:
 
 
 class Reacher:
-    """Moves the point suite's tool straight to the object, by at most 0.02 m along each axis."""
+    """Moves the point suite's tool straight to the object, by at most 0.02 m an axis; has no critic."""
 
     config, spec, sampling = None, Spec(11, 4), Sampling()
 
@@ -57,9 +57,6 @@ class Reacher:
     def act(self, state, observation, key):
         move = jnp.clip((observation[4:7] - observation[0:3]) / 0.02, -1, 1)
         return jnp.append(move * (1 - state.level), -1.0)
-
-    def value(self, state, observation, actions):
-        return jnp.zeros(len(actions))
 
     def update(self, state, batch, key):
         return state, {}

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 from jax import numpy as jnp
-from stand_ins import Follower, Scalar, read_scene
+from stand_ins import Follower, Reacher, Scalar, read_scene
 
 from hcpg.loops import acting
 from hcpg.methods.sac_flow import Config, SACFlow
@@ -126,3 +126,8 @@ def test_hcpg_over_one_candidate_is_sac_flow_bit_for_bit():
     np.testing.assert_array_equal(guided, first)
     np.testing.assert_array_equal(guided, bare)
     assert float(abs(guided).min()) > 0.0
+
+
+def test_ranking_by_value_needs_a_method_with_a_critic():
+    with pytest.raises(TypeError, match=r"'value' needs a method with .value., got .*Reacher"):
+        acting.guided(Reacher(), Selector("value"), read_scene)
