@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import torch
 from jax import numpy as jnp
+from scipy import stats
 from torch import distributions
 
 from hcpg.networks.dense import Dense
-from hcpg.networks.gaussian import GaussianActor, TanhGaussian, bounded_log_deviation
+from hcpg.networks.gaussian import GaussianActor, TanhGaussian, bounded_log_deviation, tanh_log_slope
 
 LOG_PEAK = -0.5 * np.log(2 * np.pi)
 
@@ -70,3 +71,26 @@ def test_one_observation_serves_many_samples(actor):
     many = actor(jnp.broadcast_to(observation, (6, 5))).sample(noise)
     np.testing.assert_allclose(one.actions, many.actions, atol=1e-6)
     np.testing.assert_allclose(one.log_prob, many.log_prob, atol=1e-5)
+
+
+def test_the_tanh_correction_is_that_of_a_change_of_variables():
+    """tanh bounds to (-2, 2): the histogram of 2 tanh(x) is the normal density over the slope."""
+    x = np.random.default_rng(0).normal(size=1_000_000)
+    counts, edges = np.histogram(2 * np.tanh(x), bins=40, range=(-1.6, 1.6))
+    at = np.arctanh((edges[:-1] + edges[1:]) / 2 / 2)
+    density = np.exp(stats.norm.logpdf(at) - np.asarray(tanh_log_slope(jnp.asarray(at, jnp.float32), 2.0)))
+    np.testing.assert_allclose(counts / len(x) / (edges[1] - edges[0]), density, rtol=0.03)
+
+
+def test_a_wider_range_adds_its_logarithm_to_the_correction():
+    x = jnp.array([-1.0, 0.0, 0.5])
+    offset = tanh_log_slope(x, 3.0) - tanh_log_slope(x)
+    np.testing.assert_allclose(offset, np.full(3, np.log(3.0)), atol=1e-5)
+
+
+def test_the_correction_and_its_slope_are_exact_where_tanh_saturates():
+    """1 - tanh^2 is 2.4576e-5 at 6 and 4.5014e-7 at 8, where float32 knows no tanh but 1."""
+    x = jnp.array([6.0, -6.0, 8.0, -8.0, 80.0])
+    slope, rise = tanh_log_slope(x), jax.grad(lambda each: tanh_log_slope(each).sum())(x)
+    np.testing.assert_allclose(slope, [-10.57392, -10.57392, -13.44387, -13.44387, np.log(1e-6)], atol=1e-4)
+    np.testing.assert_allclose(rise, [-1.92178, 1.92178, -0.62082, 0.62082, 0.0], atol=1e-4)
