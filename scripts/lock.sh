@@ -36,7 +36,7 @@ PYTHON
     echo "requirements/$name.txt: $(grep -c == "$work/$name.txt") packages"
 }
 
-resolve run '.[train,metaworld,video,plots]' 'hatchling>=1.27,<2' 'editables>=0.5'
+resolve run '.[train,metaworld,video,plots,statistics]' 'hatchling>=1.27,<2' 'editables>=0.5'
 resolve test '.[test]'
 resolve lint '.[lint]'
 resolve bench '.[bench]'

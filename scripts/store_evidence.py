@@ -104,7 +104,8 @@ def curves(run: Record) -> list[str]:
 def store(run: Record, folder: Path) -> None:
     """One run's settings, provenance and rows."""
     folder.mkdir(parents=True)
-    shutil.copy(run.path / "config.json", folder)
+    for name in ("config.json", "status.json"):
+        shutil.copy(run.path / name, folder)
     manifest = json.loads((run.path / "manifest.json").read_text())
     manifest["versions"] = {name: manifest["versions"].get(name) for name in PACKAGES}
     for private in ("command", "platform"):  # the first holds paths; README.md has the command

@@ -14,6 +14,7 @@ import hcpg
 COMMANDS = {
     "train": "train runs of one or more presets and seeds, or continue runs",
     "evaluate": "evaluate a trained run or checkpoint, with any selector",
+    "compare": "say how two presets differ on the same start states, with intervals",
     "play": "make a video of a trained run",
     "list": "show the methods, selectors, tasks, presets and budgets",
     "doctor": "look at this machine: what works, what is missing, and the cure",

@@ -4,10 +4,12 @@ A process killed while it appends may leave a last line without its line end. Th
 the reader and by the next append. Any other line that is not JSON means that somebody altered the file.
 """
 
+import gzip
 import json
 import logging
 import math
 import os
+import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -38,15 +40,26 @@ def append_rows(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
 def read_rows(path: Path) -> list[Row]:
     """The file's rows in order, without a torn last line; none where there is no file yet.
 
+    A stored run has its file compressed, with `.gz` added to the name.
+
     Raises:
-        RowError: a complete line is not a JSON object; the message has the file and the line number.
+        RowError: a complete line is not a JSON object, or a compressed file is damaged; the message has the
+            file and the line number.
     """
-    if not path.exists():
-        return []
-    *complete, torn = path.read_bytes().split(b"\n")
+    *complete, torn = _contents(path).split(b"\n")
     if torn:
         _LOG.warning("%s: dropped a torn last line (%d bytes)", path, len(torn))
     return [_decoded(path, number, line) for number, line in enumerate(complete, start=1)]
+
+
+def _contents(path: Path) -> bytes:
+    packed = path.with_name(path.name + ".gz")
+    if path.exists() or not packed.exists():
+        return path.read_bytes() if path.exists() else b""
+    try:
+        return gzip.decompress(packed.read_bytes())
+    except (EOFError, OSError, zlib.error) as error:
+        raise RowError(f"{packed} is damaged ({error}). Restore it.") from error
 
 
 def keep_rows_until(path: Path, step: int) -> None:

@@ -1,0 +1,167 @@
+"""Two presets on the same start states: rates, difference with its interval, and what may be concluded."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from hcpg.report.differences import (
+    Count,
+    Difference,
+    episodes_to_settle,
+    newcombe,
+    paired_bootstrap,
+    seeds_to_settle,
+)
+from hcpg.report.records import RecordError, load_runs
+from hcpg.report.rows import read_rows
+from hcpg.report.statistics import wilson
+from hcpg.types import Bool
+
+FEW_SEEDS = 5
+"""With fewer, a bootstrap over seeds is too narrow to speak about other seeds."""
+
+
+class Outcomes(NamedTuple):
+    """The last evaluation of some seeds of one preset on one task."""
+
+    preset: str
+    selector: str
+    protocol: dict[str, object]
+    """What must be equal for a comparison: task, adapter, training steps."""
+    seeds: tuple[int, ...]
+    starts: tuple[int, ...]
+    successes: Bool[np.ndarray, "S E"]
+    """`success_once`, by seed and start state."""
+
+    @property
+    def total(self) -> Count:
+        """All seeds together."""
+        return Count(int(self.successes.sum()), self.successes.size)
+
+
+def outcomes(root: Path, selector: str | None = None) -> Outcomes:
+    """What the runs at or under `root` reached, with their own evaluation selector unless one is named.
+
+    Raises:
+        RecordError: several presets or tasks, no evaluation with the selector, or unequal start states.
+    """
+    groups = load_runs([root])
+    if len(groups) > 1:
+        found = ", ".join(f"{group.preset} on {group.task}" for group in groups)
+        raise RecordError(f"{root} holds {found}; name the folder of one of them.")
+    group = groups[0]
+    chosen = selector or group.selector
+    curve = group.curve(chosen)
+    if curve is None or not curve.steps.size:
+        known = ", ".join(sorted({name for run in group.runs for name in run.curves}))
+        raise RecordError(
+            f"{root}: not every seed has an evaluation with {chosen!r}; there are evaluations with {known}."
+        )
+    step = int(curve.steps[-1])
+    found = [_by_start(run.path, chosen, step) for run in group.runs]
+    if any(each.keys() != found[0].keys() for each in found):
+        raise RecordError(f"{root}: the seeds were evaluated on different start states at step {step:,}.")
+    starts = tuple(sorted(found[0]))
+    return Outcomes(
+        preset=group.preset,
+        selector=chosen,
+        protocol={"task": group.task, "adapter": group.runs[0].adapter, "steps": step},
+        seeds=tuple(run.seed for run in group.runs),
+        starts=starts,
+        successes=np.array([[each[start] for start in starts] for each in found]),
+    )
+
+
+def _by_start(path: Path, selector: str, step: int) -> dict[int, bool]:
+    rows = read_rows(path / "episodes.jsonl")
+    return {
+        row["start"]: bool(row["success_once"])
+        for row in rows
+        if row["phase"] == "evaluation" and row["step"] == step and row["selector"] == selector
+    }
+
+
+def compared(first: Outcomes, second: Outcomes) -> str:
+    """The comparison as plain text.
+
+    Raises:
+        RecordError: another task, adapter, number of steps or set of start states, or no seed in common.
+    """
+    first, second = _paired(first, second)
+    paired = paired_bootstrap(first.successes, second.successes)
+    independent = newcombe(first.total, second.total)
+    task, adapter, steps = first.protocol.values()
+    seeds = " ".join(map(str, first.seeds))
+    lines = [
+        f"{task}, adapter {adapter}, last evaluation at step {steps:,}, seeds {seeds}, "
+        f"{len(first.starts)} start states",
+        *(_rates(each) for each in (first, second)),
+        f"difference {100 * paired.estimate:+.1f} points",
+        f"  paired, seeds and start states resampled: {_points(paired)}",
+        f"  episodes taken as independent (Newcombe): {_points(independent)}",
+        conclusion(first, second, paired if paired.interval.low < paired.interval.high else independent),
+    ]
+    return "\n".join(lines)
+
+
+def conclusion(first: Outcomes, second: Outcomes, difference: Difference) -> str:
+    """What may be said of `first` against `second`, and what may not."""
+    seeds = len(first.seeds)
+    limit = "; one seed says nothing of other seeds" if seeds == 1 else ""
+    if 1 < seeds < FEW_SEEDS:
+        limit = f"; {seeds} seeds say little of other seeds"
+    if difference.settled:
+        better, worse = (first, second) if difference.estimate > 0 else (second, first)
+        return f"{_name(better)} is better than {_name(worse)} on these start states (95 %){limit}."
+    if difference.estimate == 0:
+        return f"Undecided: the rates are equal{limit}."
+    return f"Undecided: the interval includes zero{limit}. {_needed(first, second)}"
+
+
+def _needed(first: Outcomes, second: Outcomes) -> str:
+    seeds = seeds_to_settle(first.successes.mean(axis=1), second.successes.mean(axis=1))
+    if seeds is not None:
+        return f"If seeds spread as these do, {seeds:,} of each would tell them apart with 80 % power."
+    episodes = episodes_to_settle(first.total.rate, second.total.rate)
+    return f"If the rates are what they seem, {episodes:,} episodes of each would, with 80 % power."
+
+
+def _paired(first: Outcomes, second: Outcomes) -> tuple[Outcomes, Outcomes]:
+    for name, value in first.protocol.items():
+        if second.protocol[name] != value:
+            raise RecordError(
+                f"{name} is {value} for {first.preset} and {second.protocol[name]} for {second.preset}; "
+                "compare runs of one protocol."
+            )
+    if first.starts != second.starts:
+        raise RecordError(
+            f"{first.preset} has {len(first.starts)} start states and {second.preset} {len(second.starts)}, "
+            "or others; evaluate both on the same ones."
+        )
+    common = tuple(seed for seed in first.seeds if seed in second.seeds)
+    if not common:
+        raise RecordError(
+            f"no seed in common: {first.seeds} and {second.seeds}; train both with the same ones."
+        )
+    return _only(first, common), _only(second, common)
+
+
+def _only(each: Outcomes, seeds: tuple[int, ...]) -> Outcomes:
+    places = [each.seeds.index(seed) for seed in seeds]
+    return each._replace(seeds=seeds, successes=each.successes[places])
+
+
+def _rates(each: Outcomes) -> str:
+    low, high = wilson(*each.total)
+    by_seed = " ".join(f"{100 * rate:.0f}" for rate in each.successes.mean(axis=1))
+    share = f"{100 * each.total.rate:5.1f} [{100 * low:.1f}, {100 * high:.1f}]"
+    return f"{_name(each)}: {share} ({each.total.successes}/{each.total.episodes}), by seed {by_seed}"
+
+
+def _name(each: Outcomes) -> str:
+    return f"{each.preset} ({each.selector})"
+
+
+def _points(difference: Difference) -> str:
+    return f"[{100 * difference.interval.low:+.1f}, {100 * difference.interval.high:+.1f}]"
