@@ -37,6 +37,7 @@ def test_each_cell(groups):
     # The other: (0 + .05) / 2 = 2.5.
     assert table["AUC"] == ["52.0 ± 25.5", "2.5"]
     assert table["steps to 80 %"] == ["300 500", "-"]
+    assert table["fell below 50 % after 80 %"] == ["0 of 2", "0 of 1"]
     assert table["steps/s per seed"] == ["300", "300"]
     assert table["wall time, s"] == ["180", "180"]
 
@@ -54,3 +55,10 @@ def test_a_task_has_its_own_table(groups, tmp_path, write_run):
         "### point/carry",
         "### point/reach",
     ]
+
+
+def test_a_seed_that_lost_what_it_had_reached_is_counted(write_run):
+    write_run(preset="a", seed=0, bare=[9, 4, 9])
+    path = write_run(preset="a", seed=1, bare=[9, 5, 9])
+    text = markdown(load_runs([path.parents[1]]))
+    assert "| fell below 50 % after 80 % | 1 of 2" in text

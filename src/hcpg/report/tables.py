@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 
+from hcpg.report.differences import collapsed
 from hcpg.report.records import BARE, Curve, Group
 from hcpg.report.statistics import auc, final, last_five, spread, steps_to, wilson
 
@@ -35,6 +36,7 @@ def _table(groups: Sequence[Group]) -> str:
         "last five": _last_five,
         "AUC": _area,
         "steps to 80 %": _steps_to_level,
+        "fell below 50 % after 80 %": _collapses,
         "steps/s per seed": lambda group: _number([run.steps_per_s for run in group.runs]),
         "wall time, s": lambda group: _number([run.wall_s for run in group.runs]),
     }
@@ -102,6 +104,12 @@ def _steps_to_level(group: Group) -> str:
     curves = [run.curves[group.selector] for run in group.runs]
     reached = [steps_to(curve.steps, curve.rates, _LEVEL) for curve in curves]
     return " ".join(_ABSENT if steps is None else f"{steps:,}" for steps in reached)
+
+
+def _collapses(group: Group) -> str:
+    """How many seeds lost what they had reached."""
+    lost = [bool(collapsed(run.curves[group.selector].rates[None])[0]) for run in group.runs]
+    return f"{sum(lost)} of {len(lost)}"
 
 
 def _number(values: Sequence[float]) -> str:
