@@ -12,7 +12,6 @@ import shutil
 from pathlib import Path
 
 from hcpg import presets
-from hcpg.commands import options
 from hcpg.report.figures import learning_curves
 from hcpg.report.records import BARE, Group, Record, find_runs, load_run, load_runs
 from hcpg.report.tables import aligned, markdown
@@ -73,7 +72,7 @@ def settings_of(run: Record) -> list[str]:
     """Budget, steps, and whatever else is not as the preset has it."""
     settings = presets.from_json(json.loads((run.path / "config.json").read_text()))
     budget = ["--budget", settings.budget.name, "--steps", str(settings.budget.steps)]
-    others = options.differences(settings)
+    others = presets.differences(settings)
     if "--budget.steps" in others:
         place = others.index("--budget.steps")
         del others[place : place + 2]

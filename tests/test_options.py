@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from hcpg import presets
-from hcpg.commands.options import differences, overridden
+from hcpg.commands.options import overridden
+from hcpg.presets import differences
 
 USUAL = presets.settings("metaworld/drawer-open", "hcpg_flow", "cpu")
 

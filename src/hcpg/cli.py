@@ -15,6 +15,7 @@ COMMANDS = {
     "train": "train runs of one or more presets and seeds, or continue runs",
     "evaluate": "evaluate a trained run or checkpoint, with any selector",
     "compare": "say how two presets differ on the same start states, with intervals",
+    "experiment": "make the runs of a table on all cores, or show how far they are",
     "play": "make a video of a trained run",
     "list": "show the methods, selectors, tasks, presets and budgets",
     "doctor": "look at this machine: what works, what is missing, and the cure",

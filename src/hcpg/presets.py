@@ -77,6 +77,10 @@ class Settings:
         return asdict(self)
 
 
+PARTS = ("learner", "selector", "evaluation_selector", "budget")
+"""The nested settings, each value of which has an option of its own."""
+
+
 @dataclass(frozen=True)
 class Preset:
     """A method and the selector it acts with."""
@@ -248,6 +252,19 @@ def _known(kind: str, name: str, table: dict[str, Any]) -> Any:
     if name not in table:
         raise registry.UnknownNameError(kind, name, sorted(table))
     return table[name]
+
+
+def differences(chosen: Settings) -> list[str]:
+    """The options of `hcpg train` that lead from the preset and its budget to these settings."""
+    usual = settings(chosen.task, chosen.preset, chosen.budget.name)
+    options = [] if chosen.adapter == usual.adapter else ["--adapter", chosen.adapter]
+    for part in PARTS:
+        values, usual_values = asdict(getattr(chosen, part)), asdict(getattr(usual, part))
+        for name, value in values.items():
+            if value != usual_values[name]:
+                words = value if isinstance(value, tuple) else [value]
+                options += [f"--{part}.{name}".replace("_", "-"), *map(str, words)]
+    return options
 
 
 def from_json(config: dict[str, Any]) -> Settings:

@@ -1,14 +1,12 @@
 """The settings behind `hcpg train`'s options: names first, then any single value, checked before training."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, field, make_dataclass, replace
+from dataclasses import field, make_dataclass, replace
 
 from hcpg import presets, registry
 from hcpg.loops.schedule import Schedule
-from hcpg.presets import Settings
+from hcpg.presets import PARTS, Settings
 from hcpg.registry import UnknownNameError
-
-_NESTED = ("learner", "selector", "evaluation_selector", "budget")
 
 
 def overridden(settings: Settings, options: Sequence[str]) -> Settings:
@@ -19,20 +17,7 @@ def overridden(settings: Settings, options: Sequence[str]) -> Settings:
     import tyro
 
     changed = tyro.cli(_nested_type(settings), args=list(options), prog="hcpg train")
-    return replace(settings, **{name: getattr(changed, name) for name in _NESTED})
-
-
-def differences(settings: Settings) -> list[str]:
-    """The options that lead from the preset to `settings`: the inverse of `overridden`, and `--adapter`."""
-    usual = presets.settings(settings.task, settings.preset, settings.budget.name)
-    options = [] if settings.adapter == usual.adapter else ["--adapter", settings.adapter]
-    for part in _NESTED:
-        values, usual_values = asdict(getattr(settings, part)), asdict(getattr(usual, part))
-        for name, value in values.items():
-            if value != usual_values[name]:
-                words = value if isinstance(value, tuple) else [value]
-                options += [f"--{part}.{name}".replace("_", "-"), *map(str, words)]
-    return options
+    return replace(settings, **{name: getattr(changed, name) for name in PARTS})
 
 
 def help_text(settings: Settings) -> str:
@@ -61,7 +46,5 @@ def check(settings: Settings) -> None:
 
 def _nested_type(settings: Settings) -> type:
     """A dataclass of the nested settings with their concrete types, for tyro to read."""
-    parts = [
-        (name, type(getattr(settings, name)), field(default=getattr(settings, name))) for name in _NESTED
-    ]
+    parts = [(name, type(getattr(settings, name)), field(default=getattr(settings, name))) for name in PARTS]
     return make_dataclass("Settings", parts)

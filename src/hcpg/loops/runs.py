@@ -185,6 +185,17 @@ class RunFolder:
             file.flush()
             yield
 
+    def in_use(self) -> bool:
+        """Whether a live process trains in the folder."""
+        if not (self.path / "lock").exists():
+            return False
+        with (self.path / "lock").open() as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return True
+        return False
+
     def _table(self, name: Table) -> Path:
         return self.path / f"{name}.jsonl"
 
