@@ -17,6 +17,7 @@ COMMANDS = {
     "compare": "say how two presets differ on the same start states, with intervals",
     "experiment": "make the runs of a table on all cores, or show how far they are",
     "play": "make a video of a trained run",
+    "report": "write the table and the learning curves of all runs in a folder",
     "list": "show the methods, selectors, tasks, presets and budgets",
     "doctor": "look at this machine: what works, what is missing, and the cure",
 }

@@ -1,0 +1,178 @@
+"""The paper's main table from run folders: last-five success per task and method, as LaTeX, Markdown and CSV.
+
+Source: paper, tables of Meta-World and ManiSkill success. Rows of tasks have the SD over seeds, the last row
+that over the tasks' means; both are sample SDs, and neither is a confidence interval.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hcpg.report.records import Group, RecordError
+from hcpg.report.statistics import Spread, last_five, spread
+from hcpg.report.tables import aligned
+
+METHODS = {
+    "sac": "SAC",
+    "flowrl": "FlowRL",
+    "qsm": "QSM",
+    "sac_flow": "SAC-Flow",
+    "q_guided": "Q-guided K=4",
+    "hcpg_k2": "HCPG K=2",
+    "hcpg_flow": "HCPG-Flow",
+    "hcpg_k8": "HCPG K=8",
+}
+"""Presets by the paper's names, in the order of its columns; others follow under their own."""
+ACROSS = "Across-task mean"
+
+
+class MainTable(NamedTuple):
+    """Percent, by task and method."""
+
+    tasks: list[str]
+    methods: list[str]
+    cells: dict[tuple[str, str], Spread]
+    """By (task, method); a pair that has no runs is not there."""
+    across: dict[str, Spread]
+    """By method, for methods that have every task."""
+    protocol: dict[str, str]
+    """What all runs have alike: budget, steps, adapter, evaluation episodes, seeds."""
+
+
+def main_table(groups: Sequence[Group]) -> MainTable:
+    """The table of all groups, evaluated with their own selectors.
+
+    Raises:
+        RecordError: the groups differ in budget, steps, adapter, evaluation episodes or seeds.
+        StatisticsError: a run has fewer than five evaluations.
+    """
+    protocol = one_protocol(groups)
+    cells = {(task_name(group.task), method_name(group.preset)): _last_five(group) for group in groups}
+    tasks = sorted({task for task, _ in cells})
+    known = [*METHODS.values(), *sorted({method for _, method in cells} - set(METHODS.values()))]
+    methods = [name for name in known if any(method == name for _, method in cells)]
+    across = {
+        method: spread(np.array([cells[task, method].mean for task in tasks]))
+        for method in methods
+        if all((task, method) in cells for task in tasks)
+    }
+    return MainTable(tasks, methods, cells, across, protocol)
+
+
+def one_protocol(groups: Sequence[Group]) -> dict[str, str]:
+    """What all runs of a table have alike.
+
+    Raises:
+        RecordError: they do not; the message has what differs, with the presets.
+    """
+    seen: dict[str, dict[str, list[str]]] = {}
+    for group in groups:
+        for name, value in _protocol(group).items():
+            seen.setdefault(name, {}).setdefault(value, []).append(f"{group.preset} on {group.task}")
+    for name, values in seen.items():
+        if len(values) > 1:
+            text = "; ".join(f"{value}: {', '.join(whose)}" for value, whose in values.items())
+            raise RecordError(f"one table cannot mix {name} ({text}). Report them apart, or finish the runs.")
+    return {name: next(iter(values)) for name, values in seen.items()}
+
+
+def _protocol(group: Group) -> dict[str, str]:
+    curve = group.curve(group.selector)
+    if curve is None or not curve.steps.size:
+        raise RecordError(
+            f"{group.preset} on {group.task}: its seeds have no evaluation in common. Train on."
+        )
+    config = json.loads((group.runs[0].path / "config.json").read_text())
+    return {
+        "budget": config.get("budget", {}).get("name", "unknown"),
+        "steps": f"{curve.steps[-1]:,}",
+        "adapter": ", ".join(sorted({run.adapter for run in group.runs})),
+        "evaluation episodes": ", ".join(map(str, sorted(set(curve.episodes.ravel().tolist())))),
+        "seeds": " ".join(str(run.seed) for run in group.runs),
+    }
+
+
+def _last_five(group: Group) -> Spread:
+    curve = group.curve(group.selector)
+    assert curve is not None
+    return spread(100 * last_five(curve.rates))
+
+
+def task_name(task: str) -> str:
+    """`metaworld/button-press` as the paper writes it: ButtonPress."""
+    return "".join(word.capitalize() for word in task.rpartition("/")[2].split("-"))
+
+
+def method_name(preset: str) -> str:
+    """A preset as the paper names it, or by its own name."""
+    return METHODS.get(preset, preset)
+
+
+def markdown(table: MainTable) -> str:
+    """As Markdown, with the protocol in a line below."""
+    rows = [["Task", *table.methods], *_rows(table, "{} ± {}", "**{}**", "-")]
+    return f"{aligned(rows)}\n\n{_note(table)}\n"
+
+
+def as_csv(table: MainTable) -> str:
+    """As CSV with a column each for mean and SD."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(["task", "method", "mean", "sd", *table.protocol])
+    named = {**table.cells, **{(ACROSS, method): each for method, each in table.across.items()}}
+    for (task, method), each in named.items():
+        writer.writerow([task, method, f"{each.mean:.4f}", f"{each.deviation:.4f}", *table.protocol.values()])
+    return file.getvalue()
+
+
+def latex(table: MainTable) -> str:
+    r"""As LaTeX with booktabs rules, the best mean of every row in bold; needs \usepackage{booktabs}."""
+    *tasks, across = _rows(table, r"{} $\pm$ {}", r"\textbf{{{}}}", "--")
+    lines = [
+        f"% {_note(table)}",
+        rf"\begin{{tabular}}{{l{'c' * len(table.methods)}}}",
+        r"  \toprule",
+        f"  {_latex_row(['Task', *table.methods])}",
+        r"  \midrule",
+        *(f"  {_latex_row(row)}" for row in tasks),
+        r"  \midrule",
+        f"  {_latex_row(across)}",
+        r"  \bottomrule",
+        r"\end{tabular}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _latex_row(cells: Sequence[str]) -> str:
+    return " & ".join(cell.replace("_", r"\_") for cell in cells) + r" \\"
+
+
+def _rows(table: MainTable, form: str, best: str, absent: str) -> list[list[str]]:
+    """A row per task and one across them; the best printed means of a row are marked."""
+    rows = [[table.cells.get((task, method)) for method in table.methods] for task in table.tasks]
+    rows.append([table.across.get(method) for method in table.methods])
+    texts = []
+    for name, row in zip([*table.tasks, ACROSS], rows, strict=True):
+        top = max((round(each.mean, 1) for each in row if each is not None), default=None)
+        cells = [absent if each is None else form.format(*_printed(each)) for each in row]
+        marked = [
+            best.format(cell) if each is not None and round(each.mean, 1) == top else cell
+            for cell, each in zip(cells, row, strict=True)
+        ]
+        texts.append([name, *marked])
+    return texts
+
+
+def _printed(each: Spread) -> tuple[str, str]:
+    return f"{each.mean:.1f}", "n/a" if np.isnan(each.deviation) else f"{each.deviation:.1f}"
+
+
+def _note(table: MainTable) -> str:
+    facts = ", ".join(f"{name} {value}" for name, value in table.protocol.items())
+    return (
+        f"Last-five success, percent, mean and sample SD (rows: over seeds; last row: over tasks); {facts}."
+    )
