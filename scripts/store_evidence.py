@@ -1,7 +1,7 @@
 """Keep runs as evidence: table, and each run's settings and raw rows, compressed.
 
 Usage: store_evidence.py FOLDER RUNS... ; RUNS are run folders or folders of them. Runs of a preset are seeds
-of one experiment, shown with their curves; with --pilots every run stands for itself, whatever its settings.
+of one experiment, shown with their curves; with --each-run every run stands for itself, whatever it is.
 What is written is small enough for the repository, and free of this machine's paths.
 """
 
@@ -18,7 +18,7 @@ from hcpg.report.tables import aligned, markdown
 
 PACKAGES = ("python", "jax", "jaxlib", "equinox", "optax", "numpy", "mujoco", "metaworld")
 TABLES = ("episodes.jsonl", "metrics.jsonl")
-PILOTS = """# Pilot runs
+EACH_RUN = """# Runs, each by itself
 
 Each row is `hcpg train --task TASK --preset PRESET --seeds SEED` with the options given, which are those
 that differ from the preset and its budget of today. Success of every evaluation, in percent, in the order of
@@ -31,10 +31,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("runs", type=Path, nargs="+")
-    parser.add_argument("--pilots", action="store_true", help="a row per run, no curves")
+    parser.add_argument("--each-run", action="store_true", help="a row per run, no curves")
     asked = parser.parse_args()
     asked.folder.mkdir(parents=True)
-    (store_pilots if asked.pilots else store_groups)(asked.folder, asked.runs)
+    (store_each if asked.each_run else store_groups)(asked.folder, asked.runs)
 
 
 def store_groups(folder: Path, roots: list[Path]) -> None:
@@ -79,7 +79,7 @@ def settings_of(run: Record) -> list[str]:
     return budget + others
 
 
-def store_pilots(folder: Path, roots: list[Path]) -> None:
+def store_each(folder: Path, roots: list[Path]) -> None:
     """Every run that was evaluated at least once, by itself."""
     runs = [load_run(path) for root in roots for path in find_runs(root)]
     runs = [run for run in runs if run.curves]
@@ -87,7 +87,7 @@ def store_pilots(folder: Path, roots: list[Path]) -> None:
         [run.task, run.preset, " ".join(settings_of(run)), str(run.seed), *curves(run)] for run in runs
     )
     heading = ["task", "preset", "options", "seed", "with the selector", "bare"]
-    (folder / "README.md").write_text(f"{PILOTS}\n{aligned([heading, *rows])}\n")
+    (folder / "README.md").write_text(f"{EACH_RUN}\n{aligned([heading, *rows])}\n")
     for run in runs:
         store(run, folder / "runs" / run.path.name)
 
