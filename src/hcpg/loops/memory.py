@@ -5,6 +5,6 @@ import platform
 
 
 def hand_back() -> None:
-    """Let go of what the allocator keeps, 0.4 GB after compiling a learner. Without glibc: nothing."""
+    """Let go of what the allocator keeps after large work. Without glibc: nothing."""
     if platform.libc_ver()[0] == "glibc":
         ctypes.CDLL(None).malloc_trim(0)

@@ -19,6 +19,7 @@ import numpy as np
 
 from hcpg import registry
 from hcpg.interfaces import Environment
+from hcpg.loops.memory import hand_back
 from hcpg.types import Bool, Float, Int, UInt8
 
 PATIENCE_S = 5e-4
@@ -228,6 +229,7 @@ def _open_station(post: Post, board: Board) -> Station:
         board.busy[post.worker] = index
         environments[index] = suite.make(task, seed)
     board.busy[post.worker] = NOBODY
+    hand_back()  # reading the models leaves 40 MB behind
     return Station(environments, post.horizon, board, post.worker)
 
 
