@@ -17,10 +17,10 @@ help: ## Show the targets
 install: ## Install what the demo and training need into .venv
 	@"$(ROOT)/scripts/install.sh" run
 
-demo: install ## Train hcpg_flow and sac_flow side by side on a Meta-World task (10 minutes on 2 cores)
+demo: install ## Train hcpg_flow and sac_flow side by side on a Meta-World task (under 10 minutes on 2 cores)
 	@cd "$(ROOT)" && scripts/prepare_rendering.sh && $(PYTHON_OF_PROJECT) scripts/demo.py $(ARGS)
 
-test: ## Run the tests (under 10 minutes on 2 cores)
+test: ## Run the tests (14 minutes on 2 cores)
 	@"$(ROOT)/scripts/install.sh" run test
 	@cd "$(ROOT)" && $(TEST_SETTINGS) $(PYTHON_OF_PROJECT) -m pytest -n 2 --dist loadfile $(ARGS)
 

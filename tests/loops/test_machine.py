@@ -49,3 +49,9 @@ def test_with_a_plugin_jax_itself_is_asked(monkeypatch):
     assert machine.has_accelerator({})
     monkeypatch.setattr(machine, "_BACKEND_PROBE", "print('cpu')")
     assert not machine.has_accelerator({})
+
+
+def test_processes_keep_to_a_core_each_where_there_are_not_more_cores(monkeypatch):
+    monkeypatch.setattr(machine.os, "sched_getaffinity", lambda _: {5, 3})
+    assert machine.core_for(0, 1) is None
+    assert [machine.core_for(index, 3) for index in range(3)] == [{3}, {5}, {3}]

@@ -89,7 +89,7 @@ def train(jobs: list[Job], view: View, accelerated: bool) -> Ended:
     """
     placed = spread(jobs, accelerated)
     with Stops() as stops:
-        children = [_Child(job, len(placed), accelerated) for job in placed]
+        children = [_Child(job, index, len(placed), accelerated) for index, job in enumerate(placed)]
         told = False
         while any(child.pipe for child in children):
             ready = wait([child.pipe for child in children if child.pipe], HEARTBEAT_S)
@@ -111,7 +111,7 @@ def train(jobs: list[Job], view: View, accelerated: bool) -> Ended:
 class _Child:
     """The parent's side of one process."""
 
-    def __init__(self, job: Job, processes: int, accelerated: bool) -> None:
+    def __init__(self, job: Job, index: int, processes: int, accelerated: bool) -> None:
         self.outcomes = {seed: Outcome(lane_of(job.config, seed)) for seed in job.seeds}
         for seed, folder in zip(job.seeds, job.folders, strict=bool(job.folders)):
             self.outcomes[seed].folder = folder
@@ -125,6 +125,10 @@ class _Child:
         variables = machine.gpu_share(os.environ, processes) if accelerated else machine.one_core(os.environ)
         with deaf_start(variables):
             self.process.start()
+        core = None if accelerated else machine.core_for(index, processes)
+        if core is not None and self.process.pid is not None:
+            with suppress(ProcessLookupError):  # it has died already; `listen` will notice
+                os.sched_setaffinity(self.process.pid, core)  # its workers inherit it
         there.close()  # the child holds the only other end: its death reads as the end of the pipe
 
     def listen(self, view: View) -> None:

@@ -5,9 +5,7 @@ heavy: a worker costs the simulator and NumPy, not JAX.
 """
 
 import os
-import select
 import threading
-import time
 import traceback
 from collections.abc import Callable, Mapping
 from multiprocessing import parent_process
@@ -22,8 +20,6 @@ from hcpg.interfaces import Environment
 from hcpg.loops.memory import hand_back
 from hcpg.types import Bool, Float, Int, UInt8
 
-PATIENCE_S = 5e-4
-"""How long a worker asks for the next command before it sleeps; being woken takes as long as two steps."""
 NOBODY = -1
 """Entry of `Board.busy` while a worker is inside none of its environments."""
 
@@ -197,21 +193,12 @@ def _answer_commands(connection: Connection, post: Post, board: Board) -> None:
     connection.send((failure, None))
     try:
         while failure is None:
-            _await_command(connection)
             name, arguments = connection.recv()
             failure, result = _attempt(getattr(station, name), *arguments)
             connection.send((failure, result))
     finally:
         if station is not None:
             station.close()
-
-
-def _await_command(connection: Connection) -> None:
-    """Return when a command has come, or with the worker's patience at its end."""
-    poller, deadline = select.poll(), time.perf_counter() + PATIENCE_S
-    poller.register(connection.fileno(), select.POLLIN)  # `Connection.poll` builds one at every call
-    while not poller.poll(0) and time.perf_counter() < deadline:
-        pass
 
 
 def _attempt(call: Callable[..., Any], *arguments: Any) -> tuple[str | None, Any]:
