@@ -20,7 +20,7 @@ install: ## Install what the demo and training need into .venv
 demo: install ## Train hcpg_flow and sac_flow side by side on a Meta-World task (under 10 minutes on 2 cores)
 	@cd "$(ROOT)" && scripts/prepare_rendering.sh && $(PYTHON_OF_PROJECT) scripts/demo.py $(ARGS)
 
-test: ## Run the tests (14 minutes on 2 cores)
+test: ## Run the tests (14 minutes on 2 cores; under 10 is the aim)
 	@"$(ROOT)/scripts/install.sh" run test
 	@cd "$(ROOT)" && $(TEST_SETTINGS) $(PYTHON_OF_PROJECT) -m pytest -n 2 --dist loadfile $(ARGS)
 

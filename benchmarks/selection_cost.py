@@ -6,6 +6,8 @@ For one environment, and for the eight that a training tick serves with one call
 import json
 import os
 import time
+from collections.abc import Callable
+from typing import Any
 
 CALLS, ENVIRONMENTS = 500, 8
 
@@ -27,10 +29,10 @@ def main() -> None:
     key, observation = jax.random.key(0), jax.random.uniform(jax.random.key(1), (39,))
     state = method.init(key)
 
-    def propose(state, key, observation):  # noqa: ANN001, ANN202
+    def propose(state: Any, key: Any, observation: Any) -> Any:
         return method.propose(state, observation, key, 4)
 
-    def both(state, key, observation):  # noqa: ANN001, ANN202
+    def both(state: Any, key: Any, observation: Any) -> Any:
         return select(propose(state, key, observation), read_scene(observation))[0]
 
     proposals = propose(state, key, observation)
@@ -45,13 +47,13 @@ def main() -> None:
     print(json.dumps(answer))
 
 
-def _pair(first, second, *arguments) -> tuple[float, float]:  # noqa: ANN001, ANN002
+def _pair(first: Callable, second: Callable, *arguments: Any) -> tuple[float, float]:
     """The fastest of five rounds of each, in turn: what disturbs one round does not decide."""
     rounds = [(_microseconds(first, *arguments), _microseconds(second, *arguments)) for _ in range(5)]
     return min(one for one, _ in rounds), min(other for _, other in rounds)
 
 
-def _microseconds(call, *arguments) -> float:  # noqa: ANN001, ANN002
+def _microseconds(call: Callable, *arguments: Any) -> float:
     import jax
 
     jax.block_until_ready(call(*arguments))

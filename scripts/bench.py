@@ -61,7 +61,10 @@ def gradient_steps() -> list[tuple[str, float, str]]:
     alone = together([["gradient_step"]], pinned=False)[0]
     two = together([["gradient_step"]] * 2, pinned=True)
     three = together([["gradient_step"]] * 3, pinned=False)
-    slowdown = max(each["seconds"] for each in three) / alone["seconds"]
+    kept = together([["gradient_step"]] * 3, pinned=True)
+    slowdown, kept_slowdown = (
+        max(run["seconds"] for run in runs) / alone["seconds"] for runs in (three, kept)
+    )
     beside = max(each["seconds"] for each in two) / one["seconds"]
     share = one["rate"] / one["products"]
     print(f"  {one['operations'] / 1e9:.2f} GFLOP per update at {one['rate'] / 1e9:.0f} GFLOP/s;", end=" ")
@@ -69,7 +72,8 @@ def gradient_steps() -> list[tuple[str, float, str]]:
     return [
         ("gradient step / matrix-product rate of one core", share, ">= 0.6"),
         ("two seeds, each on its core / one seed, time", beside, "~ 1.0"),
-        ("three seeds on all cores / one seed, time", slowdown, "<= 1.7"),
+        ("three seeds as the scheduler lays them / one seed, time", slowdown, "<= 1.7"),
+        ("three seeds kept to cores, as in training / one seed, time", kept_slowdown, "<= 1.7"),
     ]
 
 

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 OUT = ROOT / "runs" / "demo"
 TASK = "metaworld/drawer-open"
 PRESETS = ("hcpg_flow", "sac_flow")
-LENGTH = ["--steps", "45000", "--budget.evaluations", "9"]
+LENGTH = {"--steps": "45000", "--budget.evaluations": "9"}
 NEEDED_BYTES = 1 << 30
 
 
@@ -30,7 +30,8 @@ def main(options: list[str]) -> int:
         sys.stderr.write(f"demo: {free / 2**30:.1f} GiB are free at {OUT}, it needs 1: free some.\n")
         return 2
     before = set(find_runs(OUT))
-    length = [] if any("steps" in each or "evaluations" in each for each in options) else LENGTH
+    chosen = {each.partition("=")[0] for each in options} & {*LENGTH, "--budget.steps"}
+    length = [] if chosen else [word for pair in LENGTH.items() for word in pair]
     code = cli.main(["train", "--task", TASK, "--preset", *PRESETS, "--out", str(OUT), *length, *options])
     made = [path for path in find_runs(OUT) if path not in before]
     if code or not made:

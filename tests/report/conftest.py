@@ -53,7 +53,7 @@ def write_run(tmp_path):
         path.mkdir(parents=True)
         address = {"id": run_id, "task": task, "preset": preset, "seed": seed}
         (path / "manifest.json").write_text(json.dumps({"run": address}))
-        (path / "config.json").write_text("{}")
+        (path / "config.json").write_text('{"budget": {"name": "cpu"}}')
         (path / "status.json").write_text('{"state": "finished"}')
         rows = [{"step": 50, "phase": "train", "selector": selector, "adapter": "paper", "start": 0}]
         for place, bare_count in enumerate(bare):

@@ -7,6 +7,7 @@ import pytest
 
 from hcpg.report.comparison import compared, outcomes
 from hcpg.report.records import RecordError
+from hcpg.report.rows import RowError
 
 
 def folder_of(write_run, preset, successes, **others):
@@ -108,6 +109,15 @@ def test_a_folder_of_several_presets_is_refused_by_name(write_run):
     root = folder_of(write_run, "b", [5]).parent
     with pytest.raises(RecordError, match="holds a on point/reach, b on point/reach; name the folder"):
         outcomes(root)
+
+
+def test_a_damaged_stored_table_is_named(write_run):
+    path = write_run(preset="a", bare=[1, 2]) / "episodes.jsonl"
+    packed = gzip.compress(path.read_bytes())
+    path.unlink()
+    path.with_name("episodes.jsonl.gz").write_bytes(packed[: len(packed) // 2])
+    with pytest.raises(RowError, match=r"episodes\.jsonl\.gz is damaged"):
+        outcomes(path.parent)
 
 
 def test_stored_runs_with_compressed_rows_are_read_alike(write_run):

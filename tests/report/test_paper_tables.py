@@ -48,7 +48,7 @@ def test_cells_are_means_and_sample_sds_over_seeds(root):
     assert [round(each, 1) for each in table.across["SAC-Flow"]] == [95.0, 7.1]
     assert table.across.keys() == {"SAC-Flow"}
     assert table.protocol == {
-        "budget": "unknown",
+        "budget": "cpu",
         "steps": "500",
         "adapter": "paper",
         "evaluation episodes": "10",
@@ -64,7 +64,7 @@ def test_the_best_of_a_row_is_bold_and_an_equal_one_too(root):
     assert r"  Across-task mean & -- & \textbf{95.0 $\pm$ 7.1} & -- \\" in lines
     text = markdown(main_table(load_runs([root])))
     assert "**100.0 ± 0.0**" in text
-    assert "budget unknown, steps 500, adapter paper" in text
+    assert "budget cpu, steps 500, adapter paper" in text
 
 
 def test_the_csv_has_every_number(root):

@@ -2,7 +2,6 @@
 
 import fcntl
 import hashlib
-import json
 import os
 import signal
 import subprocess
@@ -13,7 +12,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import NamedTuple
 
-from hcpg.experiments.ledger import DONE, Entry, entries
+from hcpg.experiments.ledger import DONE, Entry, entries, identity
 from hcpg.experiments.protocols import Cell
 from hcpg.loops.stops import Stops
 from hcpg.presets import differences
@@ -107,8 +106,8 @@ def _started(entry: Entry, results: Path, core: int) -> Job | None:
 
 
 def _claimed(cell: Cell, results: Path) -> TextIOWrapper | None:
-    text = json.dumps(cell.settings.as_json(), sort_keys=True) + str(cell.seed)
-    file = (results / ".claims" / hashlib.sha256(text.encode()).hexdigest()[:24]).open("a")
+    digest = hashlib.sha256(repr(identity(cell)).encode()).hexdigest()
+    file = (results / ".claims" / digest).open("a")
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -30,11 +30,12 @@ def entries(cells: list[Cell], results: Path) -> list[Entry]:
     counts.
     """
     found = {_key(RunFolder(path)): path for path in find_runs(results)} if results.exists() else {}
-    return [_entry(cell, found.get((_plain(cell), cell.seed))) for cell in cells]
+    return [_entry(cell, found.get(identity(cell))) for cell in cells]
 
 
-def _plain(cell: Cell) -> str:
-    return json.dumps(cell.settings.as_json(), sort_keys=True)
+def identity(cell: Cell) -> tuple[str, int]:
+    """What a run must have to be the cell's: its whole configuration, and its seed."""
+    return json.dumps(cell.settings.as_json(), sort_keys=True), cell.seed
 
 
 def _key(folder: RunFolder) -> tuple[str, int]:

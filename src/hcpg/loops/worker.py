@@ -216,7 +216,7 @@ def _open_station(post: Post, board: Board) -> Station:
         board.busy[post.worker] = index
         environments[index] = suite.make(task, seed)
     board.busy[post.worker] = NOBODY
-    hand_back()  # reading the models leaves 40 MB behind
+    hand_back()  # what reading the models left
     return Station(environments, post.horizon, board, post.worker)
 
 

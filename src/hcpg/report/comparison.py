@@ -7,7 +7,7 @@ import numpy as np
 
 from hcpg.report.differences import (
     Count,
-    Difference,
+    Estimate,
     episodes_to_settle,
     newcombe,
     paired_bootstrap,
@@ -105,7 +105,7 @@ def compared(first: Outcomes, second: Outcomes) -> str:
     return "\n".join(lines)
 
 
-def conclusion(first: Outcomes, second: Outcomes, difference: Difference) -> str:
+def conclusion(first: Outcomes, second: Outcomes, difference: Estimate) -> str:
     """What may be said of `first` against `second`, and what may not."""
     seeds = len(first.seeds)
     limit = "; one seed says nothing of other seeds" if seeds == 1 else ""
@@ -163,5 +163,5 @@ def _name(each: Outcomes) -> str:
     return f"{each.preset} ({each.selector})"
 
 
-def _points(difference: Difference) -> str:
+def _points(difference: Estimate) -> str:
     return f"[{100 * difference.interval.low:+.1f}, {100 * difference.interval.high:+.1f}]"

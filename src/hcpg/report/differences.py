@@ -15,7 +15,7 @@ from hcpg.types import Bool, Float
 RESAMPLES = 10_000
 
 
-class Difference(NamedTuple):
+class Estimate(NamedTuple):
     """An estimate with its confidence interval."""
 
     estimate: float
@@ -39,7 +39,7 @@ class Count(NamedTuple):
         return self.successes / self.episodes
 
 
-def newcombe(first: Count, second: Count, confidence: float = 0.95) -> Difference:
+def newcombe(first: Count, second: Count, confidence: float = 0.95) -> Estimate:
     """The difference of two success rates from independent episodes.
 
     Source: Newcombe 1998, the hybrid score interval, by statsmodels.
@@ -55,7 +55,7 @@ def newcombe(first: Count, second: Count, confidence: float = 0.95) -> Differenc
     low, high = confint_proportions_2indep(
         *first, *second, method="newcomb", compare="diff", alpha=1 - confidence
     )
-    return Difference(first.rate - second.rate, Interval(float(low), float(high)))
+    return Estimate(first.rate - second.rate, Interval(float(low), float(high)))
 
 
 def fisher(first: Count, second: Count) -> float:
@@ -68,7 +68,7 @@ def fisher(first: Count, second: Count) -> float:
 
 def paired_bootstrap(
     first: Bool[np.ndarray, "S E"], second: Bool[np.ndarray, "R F"], confidence: float = 0.95, seed: int = 0
-) -> Difference:
+) -> Estimate:
     """The difference of rates over the same start states: seeds are resampled, then start states in each.
 
     With one seed it covers the start states alone; with few seeds it is too narrow, as any bootstrap is.
@@ -82,12 +82,10 @@ def paired_bootstrap(
     random, (seeds, episodes) = np.random.default_rng(seed), gains.shape
     chosen = random.integers(seeds, size=(RESAMPLES, seeds, 1))
     means = gains[chosen, random.integers(episodes, size=(RESAMPLES, seeds, episodes))].mean(axis=(1, 2))
-    return Difference(float(gains.mean()), _percentiles(means, confidence))
+    return Estimate(float(gains.mean()), _percentiles(means, confidence))
 
 
-def interquartile_mean(
-    scores: Float[np.ndarray, "T S"], confidence: float = 0.95, seed: int = 0
-) -> Difference:
+def interquartile_mean(scores: Float[np.ndarray, "T S"], confidence: float = 0.95, seed: int = 0) -> Estimate:
     """The mean of the middle half of all tasks' seeds; seeds are resampled within each task.
 
     Source: Agarwal et al. 2021, "Deep RL at the Edge of the Statistical Precipice".
@@ -100,12 +98,12 @@ def interquartile_mean(
     if scores.size == 0:
         raise StatisticsError("no scores to take the interquartile mean of")
     means = trim_mean(_within_tasks(scores, seed).reshape(RESAMPLES, -1), 0.25, axis=1)
-    return Difference(float(trim_mean(scores.ravel(), 0.25)), _percentiles(means, confidence))
+    return Estimate(float(trim_mean(scores.ravel(), 0.25)), _percentiles(means, confidence))
 
 
 def probability_of_improvement(
     first: Float[np.ndarray, "T S"], second: Float[np.ndarray, "U R"], confidence: float = 0.95, seed: int = 0
-) -> Difference:
+) -> Estimate:
     """How likely a run of the first beats a run of the second on the same task, averaged over tasks.
 
     0.5 means no difference; a tie counts half. The interval comes from seeds resampled within each task.
@@ -118,7 +116,7 @@ def probability_of_improvement(
     if len(first) != len(second) or first.size == 0 or second.size == 0:
         raise StatisticsError(f"cannot compare scores of shapes {first.shape} and {second.shape} by task")
     shares = _superiority(_within_tasks(first, seed), _within_tasks(second, seed + 1))
-    return Difference(float(_superiority(first[None], second[None])[0]), _percentiles(shares, confidence))
+    return Estimate(float(_superiority(first[None], second[None])[0]), _percentiles(shares, confidence))
 
 
 def collapsed(

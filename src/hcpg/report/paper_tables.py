@@ -88,7 +88,7 @@ def _protocol(group: Group) -> dict[str, str]:
         )
     config = json.loads((group.runs[0].path / "config.json").read_text())
     return {
-        "budget": config.get("budget", {}).get("name", "unknown"),
+        "budget": config["budget"]["name"],
         "steps": f"{curve.steps[-1]:,}",
         "adapter": ", ".join(sorted({run.adapter for run in group.runs})),
         "evaluation episodes": ", ".join(map(str, sorted(set(curve.episodes.ravel().tolist())))),

@@ -53,9 +53,11 @@ def read_rows(path: Path) -> list[Row]:
 
 
 def _contents(path: Path) -> bytes:
+    if path.exists():
+        return path.read_bytes()
     packed = path.with_name(path.name + ".gz")
-    if path.exists() or not packed.exists():
-        return path.read_bytes() if path.exists() else b""
+    if not packed.exists():
+        return b""
     try:
         return gzip.decompress(packed.read_bytes())
     except (EOFError, OSError, zlib.error) as error:
