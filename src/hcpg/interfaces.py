@@ -1,9 +1,10 @@
-"""The sockets: what a method, a suite, an environment and a task must offer."""
+"""The sockets: what a method, a suite, an environment, a task and a robot must offer."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
+from hcpg.robot_types import Ack, Command, Grip, Info, Kind, Limits, Recovery, Sight, Snapshot
 from hcpg.types import Batch, Float, Sampling, Scene, Spec, Step, Tensor, UInt8
 
 Metrics = Mapping[str, Tensor]
@@ -106,5 +107,144 @@ class Suite(Protocol):
 
         Two environments made with one seed have equal start states; sets of different seeds are
         disjoint (that is how evaluation stays apart from training).
+        """
+        ...
+
+
+@runtime_checkable
+class Clock(Protocol):
+    """Time, and waiting: of this machine, or of a simulation that runs while one waits."""
+
+    def now_s(self) -> float:
+        """Seconds since an arbitrary moment; never goes back."""
+        ...
+
+    def sleep_until(self, time_s: float) -> None:
+        """Return at `time_s` or as soon after it as possible; at once if it has passed."""
+        ...
+
+
+@runtime_checkable
+class Robot(Protocol):
+    """One arm. A driver carries out; the control loop decides and limits.
+
+    Only `connect`, `recover` and `reset` may block, each at most for its time limit. `stop` may be called
+    from any thread or signal handler, any number of times; after it, no command is carried out until
+    `connect`.
+    """
+
+    limits: Limits
+    """Set in the robot's own file."""
+    clock: Clock
+    """The clock of all its times. A twin in this process waits by running its physics."""
+
+    def connect(self, timeout_s: float) -> Info:
+        """Connect (again), check what must hold before motion, hold still; a new epoch begins.
+
+        Raises:
+            RobotError: no answer, or a check that failed; the message says which and the cure.
+        """
+        ...
+
+    def observe(self) -> Snapshot:
+        """The newest state at once, however old: it never waits for the robot."""
+        ...
+
+    def command(self, command: Command) -> Ack:
+        """Move the target there, unless the command is old, or lies outside the box or the lead."""
+        ...
+
+    def hold(self) -> None:
+        """Stay where it is now: the target becomes the measured position. Safe to call at every tick."""
+        ...
+
+    def stop(self, reason: str) -> None:
+        """Stop for good: hold, refuse whatever comes, end the motion. A new epoch begins."""
+        ...
+
+    def recover(self, timeout_s: float) -> Recovery:
+        """Clear a reflex and hold where the arm is now; a new epoch begins, whatever was queued is gone."""
+        ...
+
+    def reset(self, position: Float[Tensor, " 3"], grip: Grip, timeout_s: float) -> None:
+        """Move slowly to a start pose (m) and hold there; a new epoch begins.
+
+        Raises:
+            RobotError: it did not get there in time, or a reflex stopped it.
+        """
+        ...
+
+    def close(self) -> None:
+        """Stop and let the connection go; safe to call twice."""
+        ...
+
+
+@runtime_checkable
+class Perception(Protocol):
+    """Where the task's objects are."""
+
+    age_limit_s: float
+    """A sighting older than this is not to be acted on."""
+
+    def look(self, snapshot: Snapshot, now_s: float) -> Sight:
+        """The newest sightings at once, each with its age; it never waits for a camera."""
+        ...
+
+
+@runtime_checkable
+class Stage(Protocol):
+    """Whoever lays out the scene before an episode: the twin itself, or a person who is asked to."""
+
+    def arrange(self, start: int) -> None:
+        """Lay out start state `start`, any integer >= 0; the same layout every time."""
+        ...
+
+
+@runtime_checkable
+class Detector(Protocol):
+    """Says when the task is done, by means other than the selector's geometry."""
+
+    def update(self, snapshot: Snapshot, sight: Sight) -> bool:
+        """Whether the task is done, after one more tick."""
+        ...
+
+
+@dataclass(frozen=True)
+class RobotTask:
+    """What a task adds where an arm does it; `ROBOT_TASK` in the task's file, beside its `TASK`."""
+
+    observation_size: int
+    action_size: int
+    """3: a delta of the position; 4: and the gripper."""
+    objects: tuple[str, ...]
+    """Names of what perception has to find."""
+    observe: Callable[[Snapshot, Sight], Float[Tensor, " O"]]
+    """The observation that the policy and the task's adapters read."""
+    home: tuple[float, float, float]
+    """Where an episode starts, m."""
+    home_grip: Grip
+    make_detector: Callable[[], Detector]
+    """A fresh detector, for one episode."""
+
+
+class Rig(NamedTuple):
+    """A robot ready for one task, with its eyes and whoever lays out its scene."""
+
+    robot: Robot
+    perception: Perception
+    stage: Stage
+
+
+@runtime_checkable
+class RobotPlugin(Protocol):
+    """One kind of arm; the module's `ROBOT` in `robots/<name>.py`."""
+
+    kind: Kind
+
+    def make(self, task: str, address: str | None) -> Rig:
+        """A rig for the task `suite/name`, not connected yet; `address` is its controller's, if it has one.
+
+        Raises:
+            RobotError: this robot cannot do the task, or lacks its driver; the message says the cure.
         """
         ...
