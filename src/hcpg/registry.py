@@ -31,12 +31,13 @@ class RefusedTaskError(LookupError):
 
 
 def names(kind: str) -> list[str]:
-    """The plug-ins of one kind (`methods`, `suites`, `tasks`) that have a file, by name."""
+    """The plug-ins of one kind (`methods`, `suites`, `tasks`) that have a file (or a folder), by name."""
     package = importlib.import_module(f"hcpg.{kind}")
+    if kind != "tasks":
+        return sorted(info.name for info in pkgutil.iter_modules(package.__path__))
     found = pkgutil.walk_packages(package.__path__, f"hcpg.{kind}.")
     modules = [info.name.removeprefix(f"hcpg.{kind}.") for info in found if not info.ispkg]
-    separate = kind == "tasks"
-    named = [name.replace(".", "/").replace("_", "-") if separate else name for name in modules]
+    named = [name.replace(".", "/").replace("_", "-") for name in modules]
     return sorted(name for name in named if not name.endswith("/generic"))
 
 

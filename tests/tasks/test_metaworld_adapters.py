@@ -6,10 +6,8 @@ import array_api_compat.torch as xp_torch
 import jax
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from hcpg import registry
-from hcpg.tasks import metaworld as layout
 from hcpg.tasks.metaworld import button_press, drawer_open, lever_pull, peg_insert_side, sweep_into
 from hcpg.tasks.metaworld.generic import FAMILY, REFUSED
 
@@ -164,12 +162,6 @@ def test_lever_follows_its_arc_and_is_taken_from_below():
     under = lever_pull.read_contact_scene(observation_of([0, 0.445, 0.13], [0, 0.5, 0.25], goal))
     assert under.approach == near(0, 0, 0.05)
     assert (far.contact, under.contact) == (0, 1)
-
-
-def test_rotation_agrees_with_scipy():
-    turns = Rotation.random(20, rng=0)
-    expected = turns.apply([-0.13, 0.02, -0.01])
-    assert layout.rotated(turns.as_quat(), (-0.13, 0.02, -0.01)) == pytest.approx(expected, abs=1e-12)
 
 
 def test_one_of_each_generic_reading_is_tested():

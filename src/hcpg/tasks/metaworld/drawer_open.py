@@ -2,18 +2,8 @@
 
 from hcpg.interfaces import Task
 from hcpg.selection.arrays import namespace
-from hcpg.tasks.metaworld import (
-    CONTROL,
-    GOAL,
-    HAND,
-    HORIZON,
-    OBJECT,
-    flag,
-    funnel,
-    moved,
-    planar_distance,
-    read_paper_scene,
-)
+from hcpg.selection.geometry import flag, funnel, moved, planar_distance
+from hcpg.tasks.metaworld import CONTROL, GOAL, HAND, HORIZON, OBJECT, read_paper_scene
 from hcpg.types import Float, Scene, Tensor
 
 BELOW_HANDLE_M = 0.02

@@ -9,18 +9,8 @@ from dataclasses import dataclass
 
 from hcpg.interfaces import ReadScene, Task
 from hcpg.selection.arrays import length
-from hcpg.tasks.metaworld import (
-    CONTROL,
-    GOAL,
-    HAND,
-    HORIZON,
-    OBJECT,
-    OPENING,
-    flag,
-    funnel,
-    read_paper_scene,
-    tip,
-)
+from hcpg.selection.geometry import flag, funnel
+from hcpg.tasks.metaworld import CONTROL, GOAL, HAND, HORIZON, OBJECT, OPENING, read_paper_scene, tip
 from hcpg.types import Float, Scene, Tensor
 
 WIDEST_GRASP = 0.75

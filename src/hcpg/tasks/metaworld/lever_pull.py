@@ -2,7 +2,8 @@
 
 from hcpg.interfaces import Task
 from hcpg.selection.arrays import length, namespace
-from hcpg.tasks.metaworld import CONTROL, GOAL, HAND, HORIZON, OBJECT, flag, funnel, moved, read_paper_scene
+from hcpg.selection.geometry import flag, funnel, moved
+from hcpg.tasks.metaworld import CONTROL, GOAL, HAND, HORIZON, OBJECT, read_paper_scene
 from hcpg.types import Float, Scene, Tensor
 
 SHOULDER_Y_M, SHOULDER_Z_M = 0.055, 0.07

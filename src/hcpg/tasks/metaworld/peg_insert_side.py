@@ -2,19 +2,8 @@
 
 from hcpg.interfaces import Task
 from hcpg.selection.arrays import length
-from hcpg.tasks.metaworld import (
-    CONTROL,
-    GOAL,
-    HORIZON,
-    OBJECT,
-    OPENING,
-    QUATERNION,
-    flag,
-    moved,
-    read_paper_scene,
-    rotated,
-    tip,
-)
+from hcpg.selection.geometry import flag, moved, rotated
+from hcpg.tasks.metaworld import CONTROL, GOAL, HORIZON, OBJECT, OPENING, QUATERNION, read_paper_scene, tip
 from hcpg.types import Float, Scene, Tensor
 
 HEAD_FROM_GRASP_M = (-0.13, 0.0, -0.01)

@@ -2,7 +2,8 @@
 
 from hcpg.interfaces import Task
 from hcpg.selection.arrays import length
-from hcpg.tasks.metaworld import CONTROL, GOAL, HORIZON, OBJECT, flag, flat, read_paper_scene, tip
+from hcpg.selection.geometry import flag, flat
+from hcpg.tasks.metaworld import CONTROL, GOAL, HORIZON, OBJECT, read_paper_scene, tip
 from hcpg.types import Float, Scene, Tensor
 
 CONTACT_M = 0.04

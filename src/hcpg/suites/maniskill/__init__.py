@@ -1,0 +1,121 @@
+"""ManiSkill: tasks of a Panda arm in SAPIEN (PhysX), with state observations and end-effector control.
+
+Three traps of the package end here. An unseeded reset draws from PyTorch's global generator, so every reset
+has a seed. The flag `is_grasped` survives a reset, so the first observation says 0. A success ends an
+episode, which would make it worth less than being close to one, so nothing here ever terminates.
+"""
+
+import difflib
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from hcpg.interfaces import Environment, Task
+from hcpg.suites.maniskill.building import build_simulation
+from hcpg.suites.maniskill.pictures import Camera
+from hcpg.suites.maniskill.stepping import Stepping, TorchStepping
+from hcpg.types import Float, Spec, Step, UInt8
+
+OBSERVATION_SIZES = {"PickCube-v1": 42, "PushCube-v1": 35, "PullCube-v1": 35, "PokeCube-v1": 54}
+ACTION_SIZES = {"pd_ee_delta_pos": 4, "pd_ee_delta_pose": 7}
+"""By control mode; the last number is the gripper's: 1 opens, -1 closes."""
+IS_GRASPED = {"PickCube-v1": 18}
+"""Where an observation holds the flag that survives a reset."""
+START_STATES = 4096
+"""Start states of one seed. ManiSkill's own seeds have 32 bits, and sets of different seeds are disjoint."""
+LARGEST_SEED = 2**32 // START_STATES - 1
+
+
+class ManiskillEnvironment:
+    """One ManiSkill task; the reward is ManiSkill's normalised dense one, at most 1 per step."""
+
+    def __init__(self, task: Task, seed: int, stepping: Stepping) -> None:
+        self._task, self._seed, self._stepping = task, seed, stepping
+        self._camera: Camera | None = None
+        self._action_size = ACTION_SIZES[control_mode(task)]
+        self._is_grasped = IS_GRASPED.get(task.env_id)
+
+    def reset(self, start: int) -> Float[np.ndarray, " O"]:
+        """The first observation of start state `start % 4096`."""
+        observation = self._stepping.reset(self._seed * START_STATES + start % START_STATES)
+        if self._is_grasped is not None:
+            observation[self._is_grasped] = 0.0
+        return observation
+
+    def step(self, action: Float[np.ndarray, " A"]) -> Step:
+        """The answer to one action; success means "now", and the episode goes on after it.
+
+        Raises:
+            ValueError: the action is not as many finite numbers as the control mode takes.
+        """
+        if action.shape != (self._action_size,) or not math.isfinite(action.sum()):
+            raise ValueError(
+                f"an action of this task is {self._action_size} finite numbers in [-1, 1], got {action}"
+            )
+        observation, reward, success = self._stepping.step(action)
+        return Step(observation, reward, False, success)
+
+    def render(self) -> UInt8[np.ndarray, "H W 3"]:
+        """The table seen from its free side; the simulation that learns is not touched by it.
+
+        Raises:
+            RenderingError: this machine has no Vulkan device that SAPIEN can draw with.
+        """
+        if self._camera is None:
+            self._camera = Camera(self._task.env_id, control_mode(self._task))
+        return self._camera.picture(self._stepping.simulation)
+
+    def close(self) -> None:
+        """Free the simulation and, where one was opened, the camera; safe to call twice."""
+        self._stepping.close()
+        if self._camera is not None:
+            self._camera.close()
+            self._camera = None
+
+
+@dataclass(frozen=True)
+class ManiskillSuite:
+    """The suite of ManiSkill's tasks."""
+
+    stepping: Literal["torch"] = "torch"
+    """Whose arithmetic makes a step; the physics is the same."""
+
+    def spec(self, task: Task) -> Spec:
+        """The sizes of the task's observation and of its control mode's action."""
+        return Spec(_known("task", task.env_id, OBSERVATION_SIZES), ACTION_SIZES[control_mode(task)])
+
+    def make(self, task: Task, seed: int) -> Environment:
+        """An environment with the 4,096 start states that `seed` names; it needs no Vulkan device.
+
+        Raises:
+            ValueError: there is no such task or control mode here, or the seed is not in [0, 2**20).
+        """
+        if not 0 <= seed <= LARGEST_SEED:
+            raise ValueError(f"a seed of maniskill is an integer in [0, {LARGEST_SEED}], got {seed}")
+        self.spec(task)
+        simulation = build_simulation(task.env_id, control_mode(task))
+        return ManiskillEnvironment(task, seed, TorchStepping(simulation))
+
+
+SUITE = ManiskillSuite()
+
+
+def control_mode(task: Task) -> str:
+    """ManiSkill's name of the task's control mode, which its `control` begins with.
+
+    Raises:
+        ValueError: it is none of those that this suite knows.
+    """
+    mode = task.control.partition(":")[0]
+    _known("control mode", mode, ACTION_SIZES)
+    return mode
+
+
+def _known(kind: str, name: str, table: dict[str, int]) -> Any:
+    if name not in table:
+        near = difflib.get_close_matches(name, table, n=1)
+        guess = f" Did you mean {near[0]!r}?" if near else ""
+        raise ValueError(f"maniskill has no {kind} {name!r} here.{guess} It has: {', '.join(table)}.")
+    return table[name]

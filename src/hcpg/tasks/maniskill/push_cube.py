@@ -1,0 +1,32 @@
+"""Push a cube over the table, away from the robot, into a disc."""
+
+from hcpg.interfaces import Task
+from hcpg.tasks.maniskill import HORIZON, TRANSLATION, read_contact_at_side
+from hcpg.types import Float, Scene, Tensor
+
+TOOL, GOAL, CUBE = slice(18, 21), slice(25, 28), slice(28, 31)
+NEAR_SIDE = -1.0
+
+
+def read_paper_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
+    """Tool, cube and goal as observed; no contact flag is observed, so a distance gate decides.
+
+    Source: paper, equation (4).
+    """
+    return Scene.of(observation[..., TOOL], observation[..., CUBE], observation[..., GOAL])
+
+
+def read_contact_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
+    """The hand goes to the cube's face on the robot's side, then pushes along the table."""
+    return read_contact_at_side(
+        observation[..., TOOL], observation[..., CUBE], observation[..., GOAL], NEAR_SIDE
+    )
+
+
+TASK = Task(
+    suite="maniskill",
+    env_id="PushCube-v1",
+    horizon=HORIZON,
+    control=TRANSLATION,
+    adapters={"paper": read_paper_scene, "contact": read_contact_scene},
+)
