@@ -15,7 +15,7 @@ def small(monkeypatch):
 
 def test_the_list_names_every_experiment_with_its_size(small, capsys):
     assert cli.main(["experiment", "list"]) == 0
-    assert "small            A small one: 4 runs, budget cpu" in capsys.readouterr().out
+    assert "\nsmall                     A small one: 4 runs, budget cpu\n" in capsys.readouterr().out
 
 
 def test_the_status_has_a_line_per_task_and_preset(small, tmp_path, capsys):
