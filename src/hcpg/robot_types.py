@@ -51,6 +51,10 @@ class Limits:
     """A state older than this: hold."""
     stale_end_s: float = 0.5
     """A state older than this: the episode ends."""
+    blind_hold_s: float = 0.5
+    """A sighting older than perception allows: hold for so long, then go on without the selector (K = 1)."""
+    gripper_refusals: int = 3
+    """How many gripper commands may fail in an episode before it ends."""
     recoveries: int = 3
     """How many reflexes in a row are cleared before a person has to look."""
 

@@ -1,0 +1,89 @@
+"""When to act: absolute deadlines on an injected clock, and how well they were kept."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hcpg.interfaces import Clock
+
+MOST_IN_A_ROW = 3
+MOST_OVERRUN_SHARE = 0.02
+"""More overruns in a row, or a larger share of an episode's ticks, and its timing does not count."""
+_SAME_S = 1e-9
+
+
+class Tick(NamedTuple):
+    """One turn of the loop."""
+
+    number: int
+    """Skipped ticks have one too, so it is the time in periods."""
+    due_s: float
+    woke_s: float
+    skipped: int
+    """How many ticks before it were not executed."""
+
+
+class Timing(NamedTuple):
+    """How well an episode kept its deadlines."""
+
+    ticks: int
+    """Executed."""
+    skipped: int
+    overruns: int
+    """Ticks that were still busy, or still asleep, when the next one was due."""
+    overruns_in_a_row: int
+    lateness_p50_ms: float
+    lateness_p99_ms: float
+    lateness_max_ms: float
+    """Of waking up, against the deadline."""
+
+    @property
+    def sound(self) -> bool:
+        """Whether the timing was good enough for the episode to count."""
+        share = self.overruns / max(self.ticks, 1)
+        return self.overruns_in_a_row <= MOST_IN_A_ROW and share <= MOST_OVERRUN_SHARE
+
+
+class Deadlines:
+    """Tick n is due at t0 + n / rate, whatever happened before. A missed tick is never made up for."""
+
+    def __init__(self, clock: Clock, rate_hz: float) -> None:
+        self._clock, self._period_s = clock, 1.0 / rate_hz
+        self._start_s = clock.now_s()
+        self._next = 0
+        self._lateness_s: list[float] = []
+        self._skipped, self._overruns, self._in_a_row, self._longest = 0, 0, 0, 0
+
+    def wait(self) -> Tick:
+        """Sleep until the next deadline that has not passed, and give its tick."""
+        planned = self._next
+        now_s = self._clock.now_s()
+        number = max(planned, math.ceil((now_s - self._start_s - _SAME_S) / self._period_s))
+        due_s = self.due_s(number)
+        self._clock.sleep_until(due_s)
+        woke_s = self._clock.now_s()
+        self._lateness_s.append(max(woke_s - due_s, 0.0))
+        # Who sleeps through a whole period wakes up in a later tick.
+        number = max(number, math.floor((woke_s - self._start_s + _SAME_S) / self._period_s))
+        self._count(number - planned)
+        self._next = number + 1
+        return Tick(number, self.due_s(number), woke_s, number - planned)
+
+    def due_s(self, number: int) -> float:
+        """When tick `number` is due."""
+        return self._start_s + number * self._period_s
+
+    def timing(self) -> Timing:
+        """What was counted so far; the lateness is NaN before the first tick."""
+        late_ms = 1000 * np.asarray(self._lateness_s or [math.nan])
+        p50, p99 = (float(np.percentile(late_ms, share)) for share in (50, 99))
+        counts = (len(self._lateness_s), self._skipped, self._overruns, self._longest)
+        return Timing(*counts, p50, p99, float(late_ms.max()))
+
+    def _count(self, skipped: int) -> None:
+        self._skipped += skipped
+        overran = skipped > 0
+        self._overruns += overran
+        self._in_a_row = self._in_a_row + 1 if overran else 0
+        self._longest = max(self._longest, self._in_a_row)
