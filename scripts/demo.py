@@ -10,7 +10,9 @@ import tempfile
 from pathlib import Path
 
 from hcpg import cli
-from hcpg.report.figures import learning_curves
+from hcpg.report.figures import CAPTION, learning_curves
+from hcpg.report.pictures import save
+from hcpg.report.provenance import provenance
 from hcpg.report.records import find_runs, load_runs
 from hcpg.report.tables import markdown
 
@@ -40,7 +42,7 @@ def main(options: list[str]) -> int:
     stem = Path(tempfile.mkdtemp(prefix="report-", dir=OUT)) / "learning_curves"
     table = markdown(groups)
     stem.with_name("table.md").write_text(table)
-    picture, _ = learning_curves(groups, stem)
+    picture, *_ = save(learning_curves(groups), stem, CAPTION, provenance(groups, "make demo"))
     sys.stdout.write(f"\n{table}\ncurves: {picture}\ntable:  {stem.with_name('table.md')}\n")
     for run in (run for group in groups for run in group.runs):
         sys.stdout.write(f"{run.preset}, seed {run.seed}: {run.path}\n")

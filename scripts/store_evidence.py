@@ -12,7 +12,9 @@ import shutil
 from pathlib import Path
 
 from hcpg import presets
-from hcpg.report.figures import learning_curves
+from hcpg.report.figures import CAPTION, learning_curves
+from hcpg.report.pictures import save
+from hcpg.report.provenance import provenance
 from hcpg.report.records import BARE, Group, Record, find_runs, load_run, load_runs
 from hcpg.report.tables import aligned, markdown
 
@@ -40,7 +42,6 @@ def main() -> None:
 def store_groups(folder: Path, roots: list[Path]) -> None:
     """The seeds of each preset together."""
     groups = load_runs(roots)
-    learning_curves(groups, folder / "learning_curves")
     (folder / "README.md").write_text(f"{commands(groups)}\n{markdown(groups)}")
     for run in (run for group in groups for run in group.runs):
         several = len({group.task for group in groups}) > 1
@@ -48,6 +49,10 @@ def store_groups(folder: Path, roots: list[Path]) -> None:
             run,
             folder / "runs" / (run.task.replace("/", "-") if several else "") / run.preset / f"s{run.seed}",
         )
+    # Of what is stored: the commands of the runs hold paths, README.md has them without.
+    groups = load_runs([folder / "runs"])
+    origin = provenance(groups, "scripts/store_evidence.py")
+    save(learning_curves(groups), folder / "learning_curves", CAPTION, origin)
 
 
 def commands(groups: list[Group]) -> str:

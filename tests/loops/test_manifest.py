@@ -1,6 +1,5 @@
 """The manifest says what an independent look at the machine and the checkout says."""
 
-import hashlib
 import json
 import subprocess
 import sys
@@ -8,24 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from hcpg.loops.manifest import code, collect, hardware, versions
-
-
-def git(folder, *arguments):
-    identity = ["-c", "user.name=a", "-c", "user.email=a@b"]
-    command = ["git", "-C", folder, *identity, *arguments]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return done.stdout.strip()
-
-
-@pytest.fixture
-def checkout(tmp_path):
-    (tmp_path / "requirements").mkdir()
-    (tmp_path / "requirements" / "run.txt").write_text("numpy==2.0\n")
-    git(tmp_path, "init", "-q")
-    git(tmp_path, "add", ".")
-    git(tmp_path, "commit", "-q", "-m", "one")
-    return tmp_path
+from hcpg.loops.manifest import collect, hardware, versions
 
 
 def test_collect_goes_through_json_unchanged(monkeypatch):
@@ -59,20 +41,6 @@ def test_versions_are_the_imported_ones():
         optax.__version__,
         np.__version__,
     )
-
-
-def test_code_names_commit_changes_and_locks(checkout):
-    lock = {"run.txt": hashlib.sha256(b"numpy==2.0\n").hexdigest()}
-    commit = git(checkout, "rev-parse", "HEAD")
-    assert code(checkout) == {"commit": commit, "dirty": False, "locks": lock}
-    (checkout / "new.py").write_text("")
-    assert code(checkout) == {"commit": commit, "dirty": True, "locks": lock}
-
-
-def test_code_outside_a_checkout_has_no_commit(checkout):
-    inside = checkout / "site-packages"
-    inside.mkdir()
-    assert code(inside) == {"commit": None, "dirty": None, "locks": {}}
 
 
 def test_hardware_agrees_with_the_system():

@@ -1,12 +1,14 @@
-"""`hcpg report`: the paper's table and the learning curves of all runs in a folder."""
+"""`hcpg report`: the paper's table and figures of all runs in a folder."""
 
 import argparse
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-DESCRIPTION = """Write the paper's table (table.md, table.tex, table.csv) and the learning curves (curves.png,
-curves.svg) of all runs under DIR, and print the table. All runs must have one protocol."""
+DESCRIPTION = """Write the paper's table (table.md, table.tex, table.csv) and figures (curves, bars, learning
+progress; as png, svg and pdf with a caption) of all runs under DIR, and print the table. All runs must have
+one protocol."""
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -16,7 +18,7 @@ def run(arguments: Sequence[str]) -> int:
     parser.add_argument("--out", type=Path, help="where to write; default: DIR/report of the first DIR")
     options = parser.parse_args(arguments)
     from hcpg.report import paper_tables
-    from hcpg.report.figures import learning_curves
+    from hcpg.report.paper_figures import write_figures
     from hcpg.report.records import load_runs
 
     groups = load_runs(options.runs)
@@ -30,7 +32,7 @@ def run(arguments: Sequence[str]) -> int:
     }
     for name, text in texts.items():
         (out / name).write_text(text)
-    pictures = learning_curves(groups, out / "curves")
+    pictures = write_figures(groups, out, shlex.join(["hcpg", "report", *arguments]))
     files = [*(str(out / name) for name in texts), *map(str, pictures)]
     sys.stdout.write(f"{texts['table.md']}\n" + "\n".join(files) + "\n")
     return 0

@@ -1,11 +1,8 @@
 """Where a run's numbers come from: versions, code, machine, protocol; how exactly they can be repeated."""
 
-import hashlib
 import os
 import platform
 import shlex
-import shutil
-import subprocess
 import sys
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
@@ -15,7 +12,7 @@ from typing import Any
 
 import jax
 
-import hcpg
+from hcpg.report.checkout import own_code
 
 _GUARANTEES = {
     "cpu": "bit-equal on CPU with the same versions",
@@ -44,7 +41,7 @@ def collect(
         "time": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
         "command": shlex.join(sys.argv),
         "versions": versions(),
-        "code": code(Path(hcpg.__file__).resolve().parents[2]),
+        "code": own_code(),
         "platform": platform.platform(),
         "hardware": hardware(),
         "guarantee": _GUARANTEES["cpu" if jax.default_backend() == "cpu" else "gpu"],
@@ -61,19 +58,6 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version(), **dict(sorted(installed.items()))}
 
 
-def code(root: Path) -> dict[str, Any]:
-    """The commit of the checkout at `root`, whether it was altered, and the SHA-256 of each lock file.
-
-    The commit is None where the package was installed from a wheel, or without git.
-    """
-    files = sorted((root / "requirements").glob("*.txt"))
-    locks = {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
-    checkout = (root / ".git").exists() and shutil.which("git") is not None
-    commit = _git(root, "rev-parse", "HEAD") if checkout else None
-    altered = _git(root, "status", "--porcelain") if checkout else None
-    return {"commit": commit, "dirty": None if altered is None else altered != "", "locks": locks}
-
-
 def hardware() -> dict[str, Any]:
     """The processor's model, its cores and those this process may use, memory in GiB, and the accelerator."""
     memory_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
@@ -86,12 +70,6 @@ def hardware() -> dict[str, Any]:
         "accelerator": None if devices[0].platform == "cpu" else devices[0].device_kind,
         "devices": len(devices),
     }
-
-
-def _git(root: Path, *arguments: str) -> str | None:
-    """What git answers, or None where it refuses (a checkout of another user, say)."""
-    done = subprocess.run(["git", "-C", str(root), *arguments], capture_output=True, text=True, check=False)
-    return done.stdout.strip() if done.returncode == 0 else None
 
 
 def _cpu_model() -> str:
