@@ -7,7 +7,6 @@ import pytest
 
 from hcpg.report.comparison import compared, outcomes
 from hcpg.report.records import RecordError
-from hcpg.report.rows import RowError
 
 
 def folder_of(write_run, preset, successes, **others):
@@ -84,8 +83,8 @@ def test_a_selector_can_be_named(write_run):
 @pytest.mark.parametrize(
     ("others", "message"),
     [
-        ({"task": "point/carry"}, "task is point/reach for a and point/carry for b"),
-        ({"episodes": 8}, "a has 10 start states and b 8"),
+        ({"task": "point/carry"}, r"cannot mix task \(point/reach: a; point/carry: b\)"),
+        ({"episodes": 8}, r"cannot mix evaluation episodes \(10: a; 8: b\)"),
     ],
 )
 def test_unlike_protocols_are_refused(others, message, write_run):
@@ -97,7 +96,7 @@ def test_unlike_protocols_are_refused(others, message, write_run):
 def test_other_steps_and_other_seeds_are_refused(write_run):
     first = folder_of(write_run, "a", [5])
     longer = write_run(preset="b", bare=[1, 2, 3])
-    with pytest.raises(RecordError, match="steps is 200 for a and 300 for b"):
+    with pytest.raises(RecordError, match=r"cannot mix steps \(200: a; 300: b\)"):
         told(first, longer)
     elsewhere = write_run(preset="c", seed=4, bare=[1, 2])
     with pytest.raises(RecordError, match=r"no seed in common: \(0,\) and \(4,\)"):
@@ -116,7 +115,7 @@ def test_a_damaged_stored_table_is_named(write_run):
     packed = gzip.compress(path.read_bytes())
     path.unlink()
     path.with_name("episodes.jsonl.gz").write_bytes(packed[: len(packed) // 2])
-    with pytest.raises(RowError, match=r"episodes\.jsonl\.gz is damaged"):
+    with pytest.raises(RecordError, match=r"episodes\.jsonl\.gz is damaged"):
         outcomes(path.parent)
 
 

@@ -66,3 +66,40 @@ def test_what_would_make_a_dishonest_number_is_an_error(tmp_path, write_run, epi
     append_rows(path / "episodes.jsonl", episode_rows(200, "hcpg", 1, 1, adapter="contact"))
     with pytest.raises(RecordError, match="mix the adapters contact, paper"):
         load_run(path)
+
+
+def test_a_corrupt_file_is_named_and_skipped_only_when_asked(tmp_path, caplog, write_run):
+    write_run(seed=0, success=[1], bare=[1])
+    bad = write_run(seed=1, success=[1], bare=[1])
+    lines = (bad / "episodes.jsonl").read_text().splitlines(keepends=True)
+    (bad / "episodes.jsonl").write_text("".join([*lines[:3], "garbage\n", *lines[3:]]))
+    message = r"s1/a/episodes\.jsonl, line 4 is not JSON: b'garbage'.* leave the run out with --skip-corrupt"
+    with pytest.raises(RecordError, match=message):
+        load_runs([tmp_path])
+    (group,) = load_runs([tmp_path], skip_corrupt=True)
+    assert [run.seed for run in group.runs] == [0]
+    assert f"skipped a corrupt run: {bad / 'episodes.jsonl'}, line 4" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("config.json", '{"budget', r"config\.json is damaged \(Unterminated string"),
+        ("status.json", "[]", r"status\.json holds no JSON object"),
+        ("manifest.json", '{"run": {"task": "t"}}', r"manifest\.json does not say task, preset and seed"),
+        ("config.json", None, r"there is no .*config\.json"),
+    ],
+)
+def test_a_damaged_part_of_a_run_is_named(name, text, message, write_run):
+    path = write_run(success=[1], bare=[1])
+    (path / name).unlink() if text is None else (path / name).write_text(text)
+    with pytest.raises(RecordError, match=message):
+        load_run(path)
+
+
+def test_equal_settings_are_one_object_however_many_runs_have_them(tmp_path, write_run):
+    for seed in (0, 1):
+        write_run(seed=seed, success=[1], bare=[1])
+    first, second = load_runs([tmp_path])[0].runs
+    assert first.config is second.config
+    assert (first.name, first.config["budget"]) == ("p on point/reach s0", {"name": "cpu"})

@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from hcpg.report.dotted import dotted
 from hcpg.report.durable import replace_json, sync_folder
 from hcpg.report.records import find_runs
 from hcpg.report.rows import Row, append_rows, keep_rows_until, read_rows
@@ -147,7 +148,7 @@ class RunFolder:
         Raises:
             RunFolderError: other keys differ; the message has each with both values.
         """
-        there, asked = _flat(self.config()), _flat(json.loads(json.dumps(config)))
+        there, asked = dotted(self.config()), dotted(json.loads(json.dumps(config)))
         free = tuple(may_differ)
         lines = [
             f"  {key}: {there.get(key, 'absent')} in the run, {asked.get(key, 'absent')} asked for"
@@ -205,14 +206,3 @@ def _inside(folder: Path) -> str:
     if not runs:
         return "Name a folder that holds config.json and manifest.json."
     return f"It holds {len(runs)} of them; name one, e.g. the newest, {runs[-1]}."
-
-
-def _flat(tree: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    """Nested dicts as dotted keys, each with its value in JSON."""
-    flat: dict[str, str] = {}
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            flat |= _flat(value, f"{prefix}{key}.")
-        else:
-            flat[f"{prefix}{key}"] = json.dumps(value)
-    return flat

@@ -13,8 +13,9 @@ from hcpg.report.differences import (
     paired_bootstrap,
     seeds_to_settle,
 )
-from hcpg.report.records import RecordError, load_runs
-from hcpg.report.rows import read_rows
+from hcpg.report.episodes import Episodes
+from hcpg.report.protocol import protocol, shared
+from hcpg.report.records import Group, RecordError, load_runs
 from hcpg.report.statistics import wilson
 from hcpg.types import Bool
 
@@ -27,8 +28,8 @@ class Outcomes(NamedTuple):
 
     preset: str
     selector: str
-    protocol: dict[str, object]
-    """What must be equal for a comparison: task, adapter, training steps."""
+    protocol: dict[str, str]
+    """What must be equal for a comparison, the seeds apart: task, budget, steps, adapter, episodes."""
     seeds: tuple[int, ...]
     starts: tuple[int, ...]
     successes: Bool[np.ndarray, "S E"]
@@ -40,46 +41,50 @@ class Outcomes(NamedTuple):
         return Count(int(self.successes.sum()), self.successes.size)
 
 
-def outcomes(root: Path, selector: str | None = None) -> Outcomes:
+def outcomes(root: Path, selector: str | None = None, skip_corrupt: bool = False) -> Outcomes:
     """What the runs at or under `root` reached, with their own evaluation selector unless one is named.
 
     Raises:
         RecordError: several presets or tasks, no evaluation with the selector, or unequal start states.
     """
-    groups = load_runs([root])
+    groups = load_runs([root], skip_corrupt)
     if len(groups) > 1:
         found = ", ".join(f"{group.preset} on {group.task}" for group in groups)
         raise RecordError(f"{root} holds {found}; name the folder of one of them.")
-    group = groups[0]
-    chosen = selector or group.selector
+    return outcomes_of(groups[0], selector)
+
+
+def outcomes_of(group: Group, selector: str | None = None) -> Outcomes:
+    """The last evaluation that all seeds of the group have in common.
+
+    Raises:
+        RecordError: no evaluation with the selector, or unequal start states or settings.
+    """
+    name, chosen = f"{group.preset} on {group.task}", selector or group.selector
     curve = group.curve(chosen)
     if curve is None or not curve.steps.size:
         known = ", ".join(sorted({name for run in group.runs for name in run.curves}))
         raise RecordError(
-            f"{root}: not every seed has an evaluation with {chosen!r}; there are evaluations with {known}."
+            f"{name}: not every seed has an evaluation with {chosen!r}; there are evaluations with {known}."
         )
     step = int(curve.steps[-1])
-    found = [_by_start(run.path, chosen, step) for run in group.runs]
-    if any(each.keys() != found[0].keys() for each in found):
-        raise RecordError(f"{root}: the seeds were evaluated on different start states at step {step:,}.")
-    starts = tuple(sorted(found[0]))
+    last = [_at_step(run.episodes[chosen], step) for run in group.runs]
+    starts = tuple(last[0].starts.tolist())
+    if any(each.starts.tolist() != list(starts) for each in last):
+        raise RecordError(f"{name}: the seeds were evaluated on different start states at step {step:,}.")
     return Outcomes(
         preset=group.preset,
         selector=chosen,
-        protocol={"task": group.task, "adapter": group.runs[0].adapter, "steps": step},
+        protocol={"task": group.task, **protocol(group), "steps": f"{step:,}"},
         seeds=tuple(run.seed for run in group.runs),
         starts=starts,
-        successes=np.array([[each[start] for start in starts] for each in found]),
+        successes=np.stack([each.successes for each in last]),
     )
 
 
-def _by_start(path: Path, selector: str, step: int) -> dict[int, bool]:
-    rows = read_rows(path / "episodes.jsonl")
-    return {
-        row["start"]: bool(row["success_once"])
-        for row in rows
-        if row["phase"] == "evaluation" and row["step"] == step and row["selector"] == selector
-    }
+def _at_step(rows: Episodes, step: int) -> Episodes:
+    there = rows.steps == step
+    return Episodes(*(column[there] for column in rows))
 
 
 def compared(first: Outcomes, second: Outcomes) -> str:
@@ -91,11 +96,11 @@ def compared(first: Outcomes, second: Outcomes) -> str:
     first, second = _paired(first, second)
     paired = paired_bootstrap(first.successes, second.successes)
     independent = newcombe(first.total, second.total)
-    task, adapter, steps = first.protocol.values()
+    facts = first.protocol
     seeds = " ".join(map(str, first.seeds))
     lines = [
-        f"{task}, adapter {adapter}, last evaluation at step {steps:,}, seeds {seeds}, "
-        f"{len(first.starts)} start states",
+        f"{facts['task']}, adapter {facts['adapter']}, last evaluation at step {facts['steps']}, "
+        f"seeds {seeds}, {len(first.starts)} start states",
         *(_rates(each) for each in (first, second)),
         f"difference {100 * paired.estimate:+.1f} points",
         f"  paired, seeds and start states resampled: {_points(paired)}",
@@ -128,12 +133,7 @@ def _needed(first: Outcomes, second: Outcomes) -> str:
 
 
 def _paired(first: Outcomes, second: Outcomes) -> tuple[Outcomes, Outcomes]:
-    for name, value in first.protocol.items():
-        if second.protocol[name] != value:
-            raise RecordError(
-                f"{name} is {value} for {first.preset} and {second.protocol[name]} for {second.preset}; "
-                "compare runs of one protocol."
-            )
+    shared((each.preset, {**each.protocol, "seeds": "any"}) for each in (first, second))
     if first.starts != second.starts:
         raise RecordError(
             f"{first.preset} has {len(first.starts)} start states and {second.preset} {len(second.starts)}, "

@@ -6,13 +6,13 @@ that over the tasks' means; both are sample SDs, and neither is a confidence int
 
 import csv
 import io
-import json
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from hcpg.report.records import Group, RecordError
+from hcpg.report.protocol import one_protocol
+from hcpg.report.records import Group
 from hcpg.report.statistics import Spread, last_five, spread
 from hcpg.report.tables import aligned
 
@@ -61,39 +61,6 @@ def main_table(groups: Sequence[Group]) -> MainTable:
         if all((task, method) in cells for task in tasks)
     }
     return MainTable(tasks, methods, cells, across, protocol)
-
-
-def one_protocol(groups: Sequence[Group]) -> dict[str, str]:
-    """What all runs of a table have alike.
-
-    Raises:
-        RecordError: they do not; the message has what differs, with the presets.
-    """
-    seen: dict[str, dict[str, list[str]]] = {}
-    for group in groups:
-        for name, value in _protocol(group).items():
-            seen.setdefault(name, {}).setdefault(value, []).append(f"{group.preset} on {group.task}")
-    for name, values in seen.items():
-        if len(values) > 1:
-            text = "; ".join(f"{value}: {', '.join(whose)}" for value, whose in values.items())
-            raise RecordError(f"one table cannot mix {name} ({text}). Report them apart, or finish the runs.")
-    return {name: next(iter(values)) for name, values in seen.items()}
-
-
-def _protocol(group: Group) -> dict[str, str]:
-    curve = group.curve(group.selector)
-    if curve is None or not curve.steps.size:
-        raise RecordError(
-            f"{group.preset} on {group.task}: its seeds have no evaluation in common. Train on."
-        )
-    config = json.loads((group.runs[0].path / "config.json").read_text())
-    return {
-        "budget": config["budget"]["name"],
-        "steps": f"{curve.steps[-1]:,}",
-        "adapter": ", ".join(sorted({run.adapter for run in group.runs})),
-        "evaluation episodes": ", ".join(map(str, sorted(set(curve.episodes.ravel().tolist())))),
-        "seeds": " ".join(str(run.seed) for run in group.runs),
-    }
 
 
 def _last_five(group: Group) -> Spread:

@@ -2,17 +2,21 @@
 
 import json
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hcpg.report.rows import Row, read_rows
+from hcpg.report.episodes import Episodes, read_evaluations
+from hcpg.report.rows import RowError, last_row, read_rows
 from hcpg.types import Float, Int
 
 BARE = "bare"
 """The selector name under which a method's own action, without any selector, is recorded."""
+PARTS = ("manifest", "config", "status")
+"""The JSON files of a run folder."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -49,11 +53,29 @@ class Record(NamedTuple):
     """The selector the run was evaluated with (beside `bare`)."""
     curves: Mapping[str, Curve]
     """By selector."""
+    episodes: Mapping[str, Episodes]
+    """The same, episode by episode."""
+    config: Mapping[str, Any]
+    """The resolved settings; runs with equal ones share the object, so it is not to be changed."""
     status: Mapping[str, Any]
-    steps_per_s: float
-    """Median rate of environment steps; NaN without metrics."""
     wall_s: float
     """Time of the training so far; NaN without metrics."""
+
+    @property
+    def name(self) -> str:
+        """The run in a few words."""
+        return f"{self.preset} on {self.task} s{self.seed}"
+
+    @property
+    def steps_per_s(self) -> float:
+        """Median rate of environment steps, read from the metrics; NaN without them.
+
+        Raises:
+            RowError: a line of the metrics is damaged.
+        """
+        rows = read_rows(self.path / "metrics.jsonl")
+        speeds = [row["steps_per_s"] for row in rows if row["steps_per_s"] is not None]
+        return float(np.median(speeds)) if speeds else float("nan")
 
 
 class Group(NamedTuple):
@@ -87,74 +109,106 @@ def find_runs(root: Path) -> list[Path]:
     return sorted((run for run in found if not run.name.startswith(".")), key=lambda run: run.name)
 
 
-def load_runs(roots: Iterable[Path]) -> list[Group]:
+def load_runs(roots: Iterable[Path], skip_corrupt: bool = False) -> list[Group]:
     """All runs at or under `roots`, grouped by task and preset; of each seed the newest run.
 
-    Runs without an evaluation and older runs of a seed are left out, with a notice.
+    Runs without an evaluation and older runs of a seed are left out, with a notice; so are runs that cannot
+    be read, if `skip_corrupt`.
 
     Raises:
-        RecordError: nothing is left, or the rows of a run contradict each other.
+        RecordError: nothing is left, the rows of a run contradict each other, or a file of it is damaged.
     """
     newest: dict[tuple[str, str, int], Record] = {}
     paths = {path for root in roots for path in find_runs(root)}
-    for path in sorted(paths, key=lambda path: path.name):
-        record = load_run(path)
+    for record in _readable(sorted(paths, key=lambda path: path.name), skip_corrupt):
         place = (record.task, record.preset, record.seed)
         if not record.curves:
-            _LOG.warning("left out %s: it has no evaluation yet", path)
+            _LOG.warning("left out %s: it has no evaluation yet", record.path)
             continue
         if place in newest:
-            _LOG.warning("left out %s: %s is a newer run of that seed", newest[place].path, path)
+            _LOG.warning("left out %s: %s is a newer run of that seed", newest[place].path, record.path)
         newest[place] = record
     if not newest:
         raise RecordError(
             f"no evaluated run under {', '.join(map(str, roots))}. Train up to an evaluation first."
         )
-    pairs = sorted({place[:2] for place in newest})
-    return [Group(*pair, tuple(newest[key] for key in sorted(newest) if key[:2] == pair)) for pair in pairs]
+    members: dict[tuple[str, str], list[Record]] = {}
+    for key in sorted(newest):
+        members.setdefault(key[:2], []).append(newest[key])
+    return [Group(*pair, tuple(runs)) for pair, runs in members.items()]
+
+
+def _readable(paths: Iterable[Path], skip_corrupt: bool) -> Iterator[Record]:
+    for path in paths:
+        try:
+            yield load_run(path)
+        except (RecordError, RowError) as error:
+            if not skip_corrupt:
+                raise RecordError(f"{error} Or leave the run out with --skip-corrupt.") from error
+            _LOG.warning("skipped a corrupt run: %s", error)
+
+
+def json_object(path: Path) -> dict[str, Any]:
+    """What a JSON file of a run folder holds; files with equal text share the object.
+
+    Raises:
+        RecordError: the file is missing, or is no JSON object.
+    """
+    if not path.is_file():
+        raise RecordError(f"there is no {path}. Restore it, or remove the rest of that run.")
+    try:
+        found = _parsed(path.read_bytes())
+    except ValueError as error:
+        raise RecordError(f"{path} is damaged ({error}). Restore it.") from error
+    if not isinstance(found, dict):
+        raise RecordError(f"{path} holds no JSON object. Restore it.")
+    return found
+
+
+_parsed = lru_cache(maxsize=256)(json.loads)
 
 
 def load_run(path: Path) -> Record:
     """One run folder; its curves are empty before the first evaluation.
 
     Raises:
-        RecordError: an evaluation counts a start state twice, or mixes adapters.
+        RecordError: an evaluation counts a start state twice, or mixes adapters; or one of the folder's JSON
+            files is damaged.
         RowError: a line of its tables is damaged.
     """
-    address = json.loads((path / "manifest.json").read_text())["run"]
-    rows = [row for row in read_rows(path / "episodes.jsonl") if row["phase"] == "evaluation"]
-    adapters = {row["adapter"] for row in rows}
-    if len(adapters) > 1:
+    manifest, config, status = (json_object(path / f"{name}.json") for name in PARTS)
+    address = manifest.get("run")
+    if not isinstance(address, dict) or not {"task", "preset", "seed"} <= address.keys():
+        raise RecordError(f"{path / 'manifest.json'} does not say task, preset and seed. Restore it.")
+    evaluations = read_evaluations(path / "episodes.jsonl")
+    if len(evaluations.adapters) > 1:
         raise RecordError(
-            f"{path}: evaluations mix the adapters {', '.join(sorted(adapters))}; report one of them."
+            f"{path}: evaluations mix the adapters {', '.join(sorted(evaluations.adapters))}; "
+            "report one of them."
         )
-    selectors = list(dict.fromkeys(row["selector"] for row in rows))
-    metrics = read_rows(path / "metrics.jsonl")
-    speeds = [row["steps_per_s"] for row in metrics if row["steps_per_s"] is not None]
+    metrics = last_row(path / "metrics.jsonl")
     return Record(
         path=path,
         task=address["task"],
         preset=address["preset"],
         seed=address["seed"],
-        adapter=next(iter(adapters), ""),
-        selector=next((name for name in selectors if name != BARE), BARE),
-        curves={name: _curve(path, [row for row in rows if row["selector"] == name]) for name in selectors},
-        status=json.loads((path / "status.json").read_text()),
-        steps_per_s=float(np.median(speeds)) if speeds else float("nan"),
-        wall_s=float(metrics[-1]["wall_s"]) if metrics else float("nan"),
+        adapter=next(iter(evaluations.adapters), ""),
+        selector=next((name for name in evaluations.by_selector if name != BARE), BARE),
+        curves={name: _curve(path, name, each) for name, each in evaluations.by_selector.items()},
+        episodes=evaluations.by_selector,
+        config=config,
+        status=status,
+        wall_s=float("nan") if metrics is None else float(metrics.get("wall_s") or "nan"),
     )
 
 
-def _curve(path: Path, rows: list[Row]) -> Curve:
-    outcomes: dict[int, dict[int, bool]] = {}
-    for row in rows:
-        episodes = outcomes.setdefault(row["step"], {})
-        if row["start"] in episodes:
-            raise RecordError(
-                f"{path}: the evaluation at step {row['step']} with selector {row['selector']} counts start "
-                f"state {row['start']} twice. Rewind the run to its checkpoint before evaluating again."
-            )
-        episodes[row["start"]] = bool(row["success_once"])
-    steps = sorted(outcomes)
-    successes = [sum(outcomes[step].values()) for step in steps]
-    return Curve(np.array(steps), np.array(successes), np.array([len(outcomes[step]) for step in steps]))
+def _curve(path: Path, selector: str, rows: Episodes) -> Curve:
+    again = (np.diff(rows.steps) == 0) & (np.diff(rows.starts) == 0)
+    if again.any():
+        place = int(np.argmax(again))
+        raise RecordError(
+            f"{path}: the evaluation at step {rows.steps[place]} with selector {selector} counts start "
+            f"state {rows.starts[place]} twice. Rewind the run to its checkpoint before evaluating again."
+        )
+    steps, begins, episodes = np.unique(rows.steps, return_index=True, return_counts=True)
+    return Curve(steps, np.add.reduceat(rows.successes.astype(np.int64), begins), episodes)

@@ -46,10 +46,43 @@ def read_rows(path: Path) -> list[Row]:
         RowError: a complete line is not a JSON object, or a compressed file is damaged; the message has the
             file and the line number.
     """
-    *complete, torn = _contents(path).split(b"\n")
-    if torn:
-        _LOG.warning("%s: dropped a torn last line (%d bytes)", path, len(torn))
-    return [_decoded(path, number, line) for number, line in enumerate(complete, start=1)]
+    return decoded(path, complete_lines(path))
+
+
+def decoded(path: Path, content: bytes) -> list[Row]:
+    """The rows in `content`, the complete lines of `path`.
+
+    Raises:
+        RowError: a line is not a JSON object; the message has the file and the line number.
+    """
+    lines = content.split(b"\n")[:-1]
+    return [_decoded(path, number, line) for number, line in enumerate(lines, start=1)]
+
+
+def last_row(path: Path) -> Row | None:
+    """The last complete row alone, None where there is none; the lines before it are not looked at.
+
+    Raises:
+        RowError: that line is not a JSON object, or a compressed file is damaged.
+    """
+    content = complete_lines(path)
+    if not content:
+        return None
+    begin = content.rfind(b"\n", 0, len(content) - 1) + 1
+    return _decoded(path, content.count(b"\n"), content[begin:-1])
+
+
+def complete_lines(path: Path) -> bytes:
+    """The file's bytes up to its last line end, with a notice of what is dropped after it.
+
+    Raises:
+        RowError: a compressed file is damaged.
+    """
+    content = _contents(path)
+    end = content.rfind(b"\n") + 1
+    if end < len(content):
+        _LOG.warning("%s: dropped a torn last line (%d bytes)", path, len(content) - end)
+    return content[:end]
 
 
 def _contents(path: Path) -> bytes:
