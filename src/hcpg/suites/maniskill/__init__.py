@@ -14,6 +14,7 @@ import numpy as np
 
 from hcpg.interfaces import Environment, Task
 from hcpg.suites.maniskill.building import build_simulation
+from hcpg.suites.maniskill.numpy_stepping import NumpyStepping
 from hcpg.suites.maniskill.pictures import Camera
 from hcpg.suites.maniskill.stepping import Stepping, TorchStepping
 from hcpg.types import Float, Spec, Step, UInt8
@@ -79,8 +80,8 @@ class ManiskillEnvironment:
 class ManiskillSuite:
     """The suite of ManiSkill's tasks."""
 
-    stepping: Literal["torch"] = "torch"
-    """Whose arithmetic makes a step; the physics is the same."""
+    stepping: Literal["numpy", "torch"] = "numpy"
+    """Whose arithmetic makes a step, ours or ManiSkill's own; physics and numbers are the same."""
 
     def spec(self, task: Task) -> Spec:
         """The sizes of the task's observation and of its control mode's action."""
@@ -96,7 +97,9 @@ class ManiskillSuite:
             raise ValueError(f"a seed of maniskill is an integer in [0, {LARGEST_SEED}], got {seed}")
         self.spec(task)
         simulation = build_simulation(task.env_id, control_mode(task))
-        return ManiskillEnvironment(task, seed, TorchStepping(simulation))
+        numpy = self.stepping == "numpy"
+        stepping = NumpyStepping(simulation, task.env_id) if numpy else TorchStepping(simulation)
+        return ManiskillEnvironment(task, seed, stepping)
 
 
 SUITE = ManiskillSuite()
