@@ -155,7 +155,10 @@ class Robot(Protocol):
         ...
 
     def hold(self) -> None:
-        """Stay where it is now: the target becomes the measured position. Safe to call at every tick."""
+        """Stay: the target becomes the measured position, and stays there at further calls.
+
+        Called at every tick without a command, also without connection and after a stop (both: no effect).
+        """
         ...
 
     def stop(self, reason: str) -> None:

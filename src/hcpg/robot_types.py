@@ -45,7 +45,7 @@ class Limits:
     """Of the impedance that pulls the TCP to its target; lead times stiffness is the force asked for."""
     force_n: float = 30.0
     """Bound of that force, and of the measured one: beyond it, no step goes further into the contact."""
-    ramp_s: float = 0.5
+    ramp_s: float = 0.2
     """After every hold, steps grow from nothing to their full length within this time."""
     stale_hold_s: float = 0.05
     """A state older than this: hold."""
