@@ -67,13 +67,35 @@ def test_seeds_that_differ_widen_the_paired_interval():
         paired_bootstrap(np.ones((1, 3), bool), np.ones((1, 4), bool))
 
 
+def test_the_paired_bounds_are_those_that_resampling_tends_to():
+    """Two seeds, two starts. One seed gains nothing; two draws of the other's give 0, 1, 2 (1/4, 1/2, 1/4).
+
+    So a drawn seed gives 0, 1, 2 with chances 5/8, 1/4, 1/8; two of them 4 with 1/64, 3 or more with 5/64,
+    2 or more with 19/64.
+    """
+    first, second = np.array([[True, False], [True, False]]), np.array([[True, False], [False, False]])
+    for confidence, high in ((0.95, 0.75), (0.96, 0.75), (0.98, 1.0), (0.8, 0.5)):
+        assert paired_bootstrap(first, second, confidence).interval == (0.0, high)
+        assert paired_bootstrap(second, first, confidence).interval == (-high, 0.0)
+
+
+def test_the_paired_bounds_agree_with_scipys_resampling():
+    """One seed: SciPy resamples the same gains."""
+    random = np.random.default_rng(3)
+    first, second = random.random((1, 400)) < 0.7, random.random((1, 400)) < 0.5
+    gains = first[0].astype(float) - second[0]
+    theirs = stats.bootstrap((gains,), np.mean, method="percentile", n_resamples=20_000, rng=0)
+    ours = paired_bootstrap(first, second).interval
+    assert ours == pytest.approx(tuple(theirs.confidence_interval), abs=0.005)
+
+
 def test_the_paired_interval_covers_a_known_difference_about_as_often_as_it_says():
     """One seed, 40 starts: success probabilities differ by 0.2 on average."""
     random, hits = np.random.default_rng(0), 0
-    for index in range(60):
+    for _ in range(60):
         level = random.uniform(size=(1, 40))
         first, second = level < 0.7, level < 0.5
-        low, high = paired_bootstrap(first, second, seed=index).interval
+        low, high = paired_bootstrap(first, second).interval
         hits += low <= 0.2 <= high
     assert stats.binomtest(hits, 60, 0.95).pvalue > 0.001
 
@@ -91,6 +113,10 @@ def test_the_probability_of_improvement_is_mann_whitneys_share():
     first, second = np.array([[3.0, 1.0, 2.0]]), np.array([[0.0, 2.0]])
     expected = stats.mannwhitneyu(first[0], second[0]).statistic / 6
     assert probability_of_improvement(first, second).estimate == pytest.approx(expected)
+    even = probability_of_improvement(np.array([[0.0, 1.0]] * 4), np.array([[0.0, 1.0]] * 4))
+    assert even.estimate == 0.5
+    # Four tasks, each a difference of two Bernoulli means of two draws: SD sqrt(1/4 / 2 * 2 / 4) / 2 = 0.125.
+    assert even.interval == pytest.approx((0.5 - 1.96 * 0.125, 0.5 + 1.96 * 0.125), abs=0.03)
     better = probability_of_improvement(first + 10, second)
     assert (better.estimate, *better.interval) == (1.0, 1.0, 1.0)
     with pytest.raises(StatisticsError, match="by task"):

@@ -10,9 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from hcpg.report.statistics import Interval, StatisticsError
-from hcpg.types import Bool, Float
+from hcpg.types import Bool, Float, Int
 
 RESAMPLES = 10_000
+AT_ONCE = 500
+"""Resamples of whole tables held in memory together."""
 
 
 class Estimate(NamedTuple):
@@ -67,22 +69,41 @@ def fisher(first: Count, second: Count) -> float:
 
 
 def paired_bootstrap(
-    first: Bool[np.ndarray, "S E"], second: Bool[np.ndarray, "R F"], confidence: float = 0.95, seed: int = 0
+    first: Bool[np.ndarray, "S E"], second: Bool[np.ndarray, "R F"], confidence: float = 0.95
 ) -> Estimate:
     """The difference of rates over the same start states: seeds are resampled, then start states in each.
 
-    With one seed it covers the start states alone; with few seeds it is too narrow, as any bootstrap is.
+    The bounds are those of infinitely many resamples, exactly. With one seed they cover the start states
+    alone; with few seeds they are too narrow, as any bootstrap's are.
 
     Raises:
         StatisticsError: nothing to compare, or differently many seeds or start states.
     """
     if first.shape != second.shape or first.size == 0:
         raise StatisticsError(f"cannot pair episodes of shapes {first.shape} and {second.shape}")
-    gains = first.astype(np.float64) - second.astype(np.float64)
-    random, (seeds, episodes) = np.random.default_rng(seed), gains.shape
-    chosen = random.integers(seeds, size=(RESAMPLES, seeds, 1))
-    means = gains[chosen, random.integers(episodes, size=(RESAMPLES, seeds, episodes))].mean(axis=(1, 2))
-    return Estimate(float(gains.mean()), _percentiles(means, confidence))
+    gains = first.astype(np.int64) - second.astype(np.int64)
+    chances = _chances_of_sums(gains)
+    means = np.arange(-gains.size, gains.size + 1) / gains.size
+    tail = (1 - confidence) / 2 - 1e-12  # a bound that is met exactly must not be lost to rounding
+    low = means[np.argmax(np.cumsum(chances) >= tail)]
+    high = means[::-1][np.argmax(np.cumsum(chances[::-1]) >= tail)]
+    return Estimate(float(gains.mean()), Interval(float(low), float(high)))
+
+
+def _chances_of_sums(gains: Int[np.ndarray, "S E"]) -> Float[np.ndarray, " sums"]:
+    """How likely each sum from -S E to S E is, when S seeds and then E gains of each are drawn at random.
+
+    A sum of independent draws has the product of their characteristic functions, so this takes no draws.
+    """
+    (seeds, episodes), size = gains.shape, 2 * gains.size + 1
+    turn = np.exp(-2j * np.pi * np.arange(size) / size)
+    alike, counts = np.unique(
+        np.stack([(gains > 0).mean(1), (gains < 0).mean(1)]), axis=1, return_counts=True
+    )
+    of_a_seed = np.zeros(size, complex)
+    for gain, loss, count in zip(*alike, counts, strict=True):
+        of_a_seed += count / seeds * (1 - gain - loss + gain * turn + loss * turn.conj()) ** episodes
+    return np.fft.fftshift(np.fft.ifft(of_a_seed**seeds).real)
 
 
 def interquartile_mean(scores: Float[np.ndarray, "T S"], confidence: float = 0.95, seed: int = 0) -> Estimate:
@@ -97,8 +118,12 @@ def interquartile_mean(scores: Float[np.ndarray, "T S"], confidence: float = 0.9
 
     if scores.size == 0:
         raise StatisticsError("no scores to take the interquartile mean of")
-    means = trim_mean(_within_tasks(scores, seed).reshape(RESAMPLES, -1), 0.25, axis=1)
-    return Estimate(float(trim_mean(scores.ravel(), 0.25)), _percentiles(means, confidence))
+    random, means = np.random.default_rng(seed), []
+    for _ in range(RESAMPLES // AT_ONCE):
+        choices = random.integers(scores.shape[1], size=(AT_ONCE, *scores.shape))
+        resampled = np.take_along_axis(scores[None], choices, axis=2)
+        means.append(trim_mean(resampled.reshape(AT_ONCE, -1), 0.25, axis=1))
+    return Estimate(float(trim_mean(scores.ravel(), 0.25)), _percentiles(np.concatenate(means), confidence))
 
 
 def probability_of_improvement(
@@ -115,8 +140,13 @@ def probability_of_improvement(
     """
     if len(first) != len(second) or first.size == 0 or second.size == 0:
         raise StatisticsError(f"cannot compare scores of shapes {first.shape} and {second.shape} by task")
-    shares = _superiority(_within_tasks(first, seed), _within_tasks(second, seed + 1))
-    return Estimate(float(_superiority(first[None], second[None])[0]), _percentiles(shares, confidence))
+    random, shares, estimate = np.random.default_rng(seed), np.zeros(RESAMPLES), 0.0
+    for ours, theirs in zip(first, second, strict=True):
+        wins = np.sign(ours[:, None] - theirs[None]) / 2 + 0.5
+        weights, others = (_multiplicities(random, len(each)) for each in (ours, theirs))
+        shares += ((weights @ wins) * others).sum(axis=1)
+        estimate += wins.mean()
+    return Estimate(float(estimate / len(first)), _percentiles(shares / len(first), confidence))
 
 
 def collapsed(
@@ -165,16 +195,10 @@ def seeds_to_settle(
     return math.ceil(float(np.asarray(needed).item()))
 
 
-def _within_tasks(scores: Float[np.ndarray, "T S"], seed: int) -> Float[np.ndarray, "N T S"]:
-    choices = np.random.default_rng(seed).integers(scores.shape[1], size=(RESAMPLES, *scores.shape))
-    return np.take_along_axis(scores[None], choices, axis=2)
-
-
-def _superiority(
-    first: Float[np.ndarray, "N T S"], second: Float[np.ndarray, "N T R"]
-) -> Float[np.ndarray, " N"]:
-    apart = np.sign(first[..., :, None] - second[..., None, :])
-    return (apart / 2 + 0.5).mean(axis=(-3, -2, -1))
+def _multiplicities(random: np.random.Generator, seeds: int) -> Float[np.ndarray, "N S"]:
+    """How often each seed is drawn in each resample, as its share of the draws."""
+    choices = random.integers(seeds, size=(RESAMPLES, seeds)) + seeds * np.arange(RESAMPLES)[:, None]
+    return np.bincount(choices.ravel(), minlength=RESAMPLES * seeds).reshape(RESAMPLES, seeds) / seeds
 
 
 def _percentiles(values: Float[np.ndarray, " N"], confidence: float) -> Interval:
