@@ -1,13 +1,14 @@
 """How a simulation is reset and stepped: the seam between the suite and what does the arithmetic."""
 
 import warnings
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from hcpg.types import Float
 
 
+@runtime_checkable
 class Stepping(Protocol):
     """One simulation, in NumPy; it knows neither start states nor time limits."""
 
