@@ -1,8 +1,9 @@
 """File name -> plug-in; nothing is imported until it is asked for.
 
 `methods/sac_flow.py` is the method `sac_flow`; `tasks/metaworld/drawer_open.py` is the task
-`metaworld/drawer-open`. A suite may add a `generic.py` beside its tasks, with the tasks that need no file
-of their own (`FAMILY`) and those it refuses, each with the reason (`REFUSED`).
+`metaworld/drawer-open`, and may bring variants of itself (`VARIANTS`, by short name). A suite may add a
+`generic.py` beside its tasks, with the tasks that need no file of their own (`FAMILY`) and those it refuses,
+each with the reason (`REFUSED`).
 """
 
 import difflib
@@ -52,17 +53,19 @@ def suite(name: str) -> Suite:
 
 
 def task(name: str) -> Task:
-    """The task `suite/name`, from its own file or from its suite's generic family.
+    """The task `suite/name`, from its own file, a variant of one, or from its suite's generic family.
 
     Raises:
-        UnknownNameError: no file and no family has the name.
+        UnknownNameError: no file, no variant and no family has the name.
         RefusedTaskError: the suite has the task, but no adapter fits it.
     """
     if name in names("tasks"):
-        module = name.replace("/", ".").replace("-", "_")
-        return importlib.import_module(f"hcpg.tasks.{module}").TASK
-    family = _family(name.partition("/")[0])
-    short = name.partition("/")[2]
+        return _task_file(name).TASK
+    suite_name, _, short = name.partition("/")
+    variants = _variants(suite_name)
+    if short in variants:
+        return variants[short]
+    family = _family(suite_name)
     if family is not None and short in family.REFUSED:
         raise RefusedTaskError(f"task {name!r} is refused: {family.REFUSED[short]}")
     if family is not None and short in family.FAMILY:
@@ -71,12 +74,23 @@ def task(name: str) -> Task:
 
 
 def task_names() -> list[str]:
-    """Every task that can be trained, those of the generic families too."""
+    """Every task that can be trained, variants and those of the generic families too."""
     known = names("tasks")
     for suite_name in names("suites"):
         family = _family(suite_name)
-        known += [f"{suite_name}/{short}" for short in (family.FAMILY if family else ())]
+        more = [*_variants(suite_name), *(family.FAMILY if family else ())]
+        known += [f"{suite_name}/{short}" for short in more]
     return sorted(set(known))
+
+
+def _task_file(name: str) -> ModuleType:
+    module = name.replace("/", ".").replace("-", "_")
+    return importlib.import_module(f"hcpg.tasks.{module}")
+
+
+def _variants(suite_name: str) -> dict[str, Task]:
+    files = [_task_file(name) for name in names("tasks") if name.startswith(f"{suite_name}/")]
+    return {short: task for file in files for short, task in getattr(file, "VARIANTS", {}).items()}
 
 
 def _family(suite_name: str) -> ModuleType | None:

@@ -5,7 +5,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
-from hcpg import presets
+from hcpg import presets, registry
 from hcpg.loops.journal import Journal, Notify
 from hcpg.loops.manifest import collect
 from hcpg.loops.runs import RunFolder
@@ -26,6 +26,7 @@ def create_folders(settings: Settings, seeds: list[int], root: Path) -> list[Run
         training_selector=asdict(settings.selector),
         evaluation_selector=asdict(settings.evaluation_selector),
     )
+    manifest["control"] = registry.task(settings.task).control
     address = {"task": settings.task, "preset": settings.preset, "manifest": manifest}
     config = settings.as_json()
     return [RunFolder.create(root, seed=seed, config=config, **address) for seed in seeds]

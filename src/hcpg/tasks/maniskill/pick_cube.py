@@ -1,7 +1,10 @@
 """Grasp a cube and hold it still at a point above the table."""
 
+from dataclasses import replace
+
 from hcpg.interfaces import Task
-from hcpg.tasks.maniskill import HORIZON, TRANSLATION
+from hcpg.selection.geometry import moved
+from hcpg.tasks.maniskill import HORIZON, POSE, TRANSLATION
 from hcpg.types import Float, Scene, Tensor
 
 IS_GRASPED = 18
@@ -19,6 +22,15 @@ def read_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
     )
 
 
+def read_lift_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
+    """The same, but once grasped the cube goes straight up, wherever its goal is.
+
+    Source: paper, equation (4), with the lift adapter's task direction.
+    """
+    scene = read_scene(observation)
+    return scene._replace(task=moved(0.0 * scene.tool, z=1.0))
+
+
 TASK = Task(
     suite="maniskill",
     env_id="PickCube-v1",
@@ -26,3 +38,8 @@ TASK = Task(
     control=TRANSLATION,
     adapters={"paper": read_scene, "contact": read_scene},
 )
+
+VARIANTS = {
+    "pick-cube-delta-pose": replace(TASK, control=POSE),
+    "pick-cube-lift": replace(TASK, adapters={"paper": read_lift_scene, "contact": read_lift_scene}),
+}

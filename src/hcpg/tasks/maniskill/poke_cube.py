@@ -5,10 +5,12 @@ is read from the vector between cube and goal. Its `peghead_to_cube_pos` leads t
 does not turn with the peg, so the head is read from the peg's pose.
 """
 
+from dataclasses import replace
+
 from hcpg.interfaces import Task
 from hcpg.selection.arrays import length, namespace
 from hcpg.selection.geometry import flag, moved, rotated
-from hcpg.tasks.maniskill import FINGERS, HORIZON, POSE
+from hcpg.tasks.maniskill import FINGERS, HORIZON, POSE, TRANSLATION
 from hcpg.types import Float, Scene, Tensor
 
 TOOL, CUBE, PEG, PEG_QUATERNION = slice(18, 21), slice(25, 28), slice(32, 35), slice(35, 39)
@@ -64,3 +66,6 @@ TASK = Task(
     control=POSE,
     adapters={"paper": read_paper_scene, "contact": read_contact_scene},
 )
+
+VARIANTS = {"poke-cube-delta-pos": replace(TASK, control=TRANSLATION)}
+"""Held upright, the hand reaches little more than half of the pegs far enough."""

@@ -1,7 +1,9 @@
 """Pull a cube over the table, towards the robot, into a disc."""
 
+from dataclasses import replace
+
 from hcpg.interfaces import Task
-from hcpg.tasks.maniskill import HORIZON, TRANSLATION, read_contact_at_side
+from hcpg.tasks.maniskill import HORIZON, POSE, TRANSLATION, read_contact_at_side
 from hcpg.types import Float, Scene, Tensor
 
 TOOL, GOAL, CUBE = slice(18, 21), slice(25, 28), slice(28, 31)
@@ -30,3 +32,5 @@ TASK = Task(
     control=TRANSLATION,
     adapters={"paper": read_paper_scene, "contact": read_contact_scene},
 )
+
+VARIANTS = {"pull-cube-delta-pose": replace(TASK, control=POSE)}
