@@ -133,10 +133,15 @@ class Robot(Protocol):
     `connect`.
     """
 
-    limits: Limits
-    """Set in the robot's own file."""
-    clock: Clock
-    """The clock of all its times. A twin in this process waits by running its physics."""
+    @property
+    def limits(self) -> Limits:
+        """What it may do, set in the robot's own file."""
+        ...
+
+    @property
+    def clock(self) -> Clock:
+        """The clock of all its times. A twin in this process waits by running its physics."""
+        ...
 
     def connect(self, timeout_s: float) -> Info:
         """Connect (again), check what must hold before motion, hold still; a new epoch begins.
@@ -186,11 +191,17 @@ class Robot(Protocol):
 class Perception(Protocol):
     """Where the task's objects are."""
 
-    age_limit_s: float
-    """A sighting older than this is not to be acted on."""
+    @property
+    def age_limit_s(self) -> float:
+        """A sighting older than this is not to be acted on."""
+        ...
 
     def look(self, snapshot: Snapshot, now_s: float) -> Sight:
         """The newest sightings at once, each with its age; it never waits for a camera."""
+        ...
+
+    def forget(self) -> None:
+        """Drop what was seen of things that move: the scene was laid out anew."""
         ...
 
 
@@ -242,7 +253,10 @@ class Rig(NamedTuple):
 class RobotPlugin(Protocol):
     """One kind of arm; the module's `ROBOT` in `robots/<name>.py`."""
 
-    kind: Kind
+    @property
+    def kind(self) -> Kind:
+        """Whether a real arm moves."""
+        ...
 
     def make(self, task: str, address: str | None) -> Rig:
         """A rig for the task `suite/name`, not connected yet; `address` is its controller's, if it has one.

@@ -114,14 +114,11 @@ class Episode:
 
     def _acted(self, record: StepRecord) -> tuple[StepRecord, Exception | None]:
         """The record with what was chosen and became of it; what the policy raised, if it did."""
-        ticket = record.tick.number
-        choose = partial(
-            self._crew.chooser.choose, record.observation, self._draw(ticket), record.verdict.alone
-        )
-        if not self._crew.worker.ask(ticket, choose):
+        draw = self._number * 1_000_000 + record.tick.number  # no two ticks of a session share one
+        choose = partial(self._crew.chooser.choose, record.observation, draw, record.verdict.alone)
+        if not self._crew.worker.ask(draw, choose):
             return _not_done(record, "the policy is busy with an earlier tick"), None
-        until_s = self._deadlines.due_s(ticket) + POLICY_SHARE / self._limits.rate_hz
-        answer = self._crew.worker.answer(ticket, until_s)
+        answer = self._crew.worker.answer(draw, record.tick.due_s + POLICY_SHARE * self._period_s)
         if answer is None:
             return _not_done(record, "the policy was late"), None
         record = record._replace(policy_s=answer.took_s)

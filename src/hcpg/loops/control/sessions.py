@@ -1,0 +1,105 @@
+"""Episode after episode on one robot; however it ends, the robot is stopped and let go."""
+
+from collections.abc import Iterable
+from typing import Literal, NamedTuple, Protocol
+
+from hcpg.loops.control.episodes import Crew, Episode
+from hcpg.loops.control.mending import Mender, Patience
+from hcpg.loops.control.records import EpisodeResult
+from hcpg.loops.control.workers import Worker
+
+Purpose = Literal["train", "evaluate"]
+
+
+class Learner(Protocol):
+    """The learner's process, as the robot's process sees it."""
+
+    def alive(self) -> bool:
+        """Whether it still learns."""
+        ...
+
+    def offer(self, result: EpisodeResult) -> None:
+        """Hand over an episode; it never waits."""
+        ...
+
+
+class SessionResult(NamedTuple):
+    """What a session did, and why it ended."""
+
+    episodes: tuple[EpisodeResult, ...]
+    ended: str
+    """"" if every start state was run, else the reason."""
+
+
+class Session:
+    """Runs episodes with one crew."""
+
+    def __init__(self, crew: Crew, calls: Worker, horizon: int, patience: Patience | None = None) -> None:
+        """`horizon` is the most actions of an episode; `calls` makes the robot's blocking calls."""
+        self._crew, self._calls, self._horizon = crew, calls, horizon
+        self._mender = Mender(crew, calls, patience or Patience())
+        self._told = False
+
+    def run(
+        self, starts: Iterable[int], purpose: Purpose = "evaluate", learner: Learner | None = None
+    ) -> SessionResult:
+        """One episode per start state, until they are done or something ends the session.
+
+        Raises:
+            LogError: steps could not be written at all.
+            Exception: whatever the policy raised; the robot is stopped.
+        """
+        results: list[EpisodeResult] = []
+        try:
+            with self._crew.button:
+                ended = self._mender.connect()
+                for number, start in enumerate(starts):
+                    ended = ended or self._unlearned(purpose, learner) or self._prepared(start)
+                    if ended:
+                        break
+                    results.append(self._episode(number, start))
+                    if learner is not None and learner.alive():
+                        learner.offer(results[-1])
+                    ended = self._settled(results[-1])
+        finally:
+            self._let_go()
+        return SessionResult(tuple(results), ended)
+
+    def _prepared(self, start: int) -> str:
+        self._crew.rig.stage.arrange(start)
+        self._crew.rig.perception.forget()
+        return self._mender.reset()
+
+    def _episode(self, number: int, start: int) -> EpisodeResult:
+        result = Episode(self._crew, number, start, self._horizon).run()
+        self._crew.log.put(result.row(number))
+        return result
+
+    def _settled(self, result: EpisodeResult) -> str:
+        """From an episode's end to a robot that holds; "" once it does, else why the session ends."""
+        if result.verdict.state == "stop":
+            return result.verdict.cause
+        if result.ended == "fault":
+            return self._mender.mend(result.verdict.state)
+        self._mender.went_well()
+        return ""
+
+    def _unlearned(self, purpose: Purpose, learner: Learner | None) -> str:
+        """Why training cannot go on; evaluation goes on without a learner, and the log says so."""
+        if learner is None or learner.alive():
+            return ""
+        if purpose == "train":
+            return "the learner died, so training stops here"
+        if not self._told:
+            self._mender.note("hold", "the learner died; evaluation goes on with the last policy")
+            self._told = True
+        return ""
+
+    def _let_go(self) -> None:
+        robot = self._crew.rig.robot
+        robot.hold()
+        robot.stop("the session ends")
+        robot.close()
+        self._crew.worker.close()
+        self._calls.close()
+        self._crew.log.close()
