@@ -7,7 +7,6 @@ from pathlib import Path
 from PIL import Image
 
 from hcpg.report.figures import learning_curves
-from hcpg.report.paper_figures import write_figures
 from hcpg.report.pictures import save
 from hcpg.report.provenance import provenance
 from hcpg.report.records import load_runs
@@ -62,10 +61,3 @@ def test_the_same_numbers_give_the_same_bytes(write_run, tmp_path):
     ]
     for one, other in zip(*both, strict=True):
         assert one.read_bytes() == other.read_bytes()
-
-
-def test_a_report_has_curves_bars_and_progress(write_run, tmp_path):
-    paths = write_figures(runs(write_run), tmp_path / "out", "c")
-    assert {path.name.partition(".")[0] for path in paths} == {"curves", "bars_point", "progress"}
-    assert len(paths) == 12
-    assert all(path.stat().st_size > 100 for path in paths)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hcpg.report.paper_tables import METHODS, method_name, one_protocol, task_name
+from hcpg.report.paper_tables import METHODS, method_name, task_name
+from hcpg.report.protocol import one_protocol
 from hcpg.report.records import Group
 from hcpg.report.statistics import Spread, last_five, spread
 from hcpg.report.styles import COLUMN_IN, PAGE_IN, Style, blank, drawing, styles_of
@@ -103,7 +104,8 @@ def _method(
     if len(tasks) > 1 and len(seeds) == len(tasks):
         spreads[len(tasks)] = spread(np.array([each.mean for each in spreads.values()]))
     _bars(axes, {place + offset: each for place, each in spreads.items()}, width, method_name(preset), style)
-    for place in {*range(len(tasks))} - {*seeds}:
+    places = len(tasks) + (len(tasks) > 1)
+    for place in {*range(places)} - {*spreads}:
         axes.text(place + offset, 0.5, "–", ha="center", va="bottom")  # no runs, as in the table
     for place, each in seeds.items():
         spaced = np.linspace(-0.25, 0.25, len(each)) * width if len(each) > 1 else np.zeros(1)

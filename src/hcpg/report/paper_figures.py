@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from hcpg.report import bars, figures, progress
+from hcpg.report import ablation_figures, bars, figures, progress
+from hcpg.report.ablation import ablated, candidate_table
 from hcpg.report.pictures import save
-from hcpg.report.provenance import Provenance, provenance
+from hcpg.report.provenance import provenance
 from hcpg.report.records import Group
 
 
@@ -22,8 +23,18 @@ def write_figures(groups: Sequence[Group], folder: Path, command: str) -> list[P
     for suite, own in bars.suites_of(groups).items():
         caption = bars.CAPTION.format(suite=suite)
         written += save(bars.success_bars(own), folder / f"bars_{suite}", caption, provenance(own, command))
-    return written + _progress(groups, folder, origin)
+    written += save(progress.progress_figure(groups), folder / "progress", progress.CAPTION, origin)
+    return written + _ablation(ablated(groups), folder, command)
 
 
-def _progress(groups: Sequence[Group], folder: Path, origin: Provenance) -> list[Path]:
-    return save(progress.progress_figure(groups), folder / "progress", progress.CAPTION, origin)
+def _ablation(groups: Sequence[Group], folder: Path, command: str) -> list[Path]:
+    """The pictures of the ablation; none where no arm was run."""
+    if not groups:
+        return []
+    origin = provenance(groups, command)
+    caption = ablation_figures.CAPTION.format(tasks=origin.facts["tasks"])
+    written = save(ablation_figures.ablation_figure(groups), folder / "ablation", caption, origin)
+    if candidate_table(groups) is None:
+        return written
+    caption = ablation_figures.CANDIDATES_CAPTION
+    return written + save(ablation_figures.candidates_figure(groups), folder / "candidates", caption, origin)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hcpg.report.booktabs import booktabs
 from hcpg.report.protocol import one_protocol
 from hcpg.report.records import Group
 from hcpg.report.statistics import Spread, last_five, spread
@@ -99,23 +100,7 @@ def as_csv(table: MainTable) -> str:
 def latex(table: MainTable) -> str:
     r"""As LaTeX with booktabs rules, the best mean of every row in bold; needs \usepackage{booktabs}."""
     *tasks, across = _rows(table, r"{} $\pm$ {}", r"\textbf{{{}}}", "--")
-    lines = [
-        f"% {_note(table)}",
-        rf"\begin{{tabular}}{{l{'c' * len(table.methods)}}}",
-        r"  \toprule",
-        f"  {_latex_row(['Task', *table.methods])}",
-        r"  \midrule",
-        *(f"  {_latex_row(row)}" for row in tasks),
-        r"  \midrule",
-        f"  {_latex_row(across)}",
-        r"  \bottomrule",
-        r"\end{tabular}",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _latex_row(cells: Sequence[str]) -> str:
-    return " & ".join(cell.replace("_", r"\_") for cell in cells) + r" \\"
+    return booktabs(["Task", *table.methods], [tasks, [across]], _note(table))
 
 
 def _rows(table: MainTable, form: str, best: str, absent: str) -> list[list[str]]:

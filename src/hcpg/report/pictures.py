@@ -34,6 +34,8 @@ def save(figure: "Figure", stem: Path, caption: str, origin: Provenance) -> list
     facts["pdf"] |= {"CreationDate": None}
     paths = []
     with drawing():
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # laid out once: it takes longer than writing a file
         for kind, metadata in facts.items():
             paths.append(stem.with_name(f"{stem.name}.{kind}"))
             figure.savefig(paths[-1], dpi=PIXELS_PER_IN, metadata=metadata)

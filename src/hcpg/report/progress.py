@@ -98,10 +98,10 @@ def progress_figure(groups: Sequence[Group]) -> "Figure":
             _panel(panel, own, styles)
             panel.set_title(name)
         panels[0].set_ylabel("success over tasks, %")
-        labels = {line.get_label(): line for panel in panels for line in panel.get_lines()}
-        figure.legend(
-            labels.values(), labels.keys(), loc="outside upper center", ncols=3, frameon=False, handlelength=3
-        )
+        lines = {line.get_label(): line for panel in panels for line in panel.get_lines()}
+        labels = [method_name(preset) for preset in styles]
+        handles = [lines[label] for label in labels]
+        figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False, handlelength=3)
     return figure
 
 

@@ -2,11 +2,10 @@
 
 import json
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 from hcpg.report.checkout import commit_text, own_code
-from hcpg.report.records import Group, Record
+from hcpg.report.records import Group
 
 _UNKNOWN = "unknown"
 
@@ -27,18 +26,27 @@ class Provenance(NamedTuple):
         return f"made by: {self.command}; commit: {self.commit}; {facts}"
 
 
+def signed(name: str, text: str, origin: Provenance) -> str:
+    """A table with its provenance in a line: below Markdown, as a comment above LaTeX.
+
+    CSV has no place for it; its columns name the protocol.
+    """
+    if name.endswith(".md"):
+        return f"{text}\n{origin.text()}\n"
+    return f"% {origin.text()}\n{text}" if name.endswith(".tex") else text
+
+
 def provenance(groups: Sequence[Group], command: str) -> Provenance:
     """What the runs of `groups` were made from, and the code at hand; where runs differ, all is listed."""
     runs = [run for group in groups for run in group.runs]
-    manifests = [_json(run, "manifest.json") for run in runs]
-    budgets = [_json(run, "config.json")["budget"] for run in runs]
+    manifests = [json.loads((run.path / "manifest.json").read_text()) for run in runs]
     steps = {curve.steps[-1] for run in runs for curve in run.curves.values() if curve.steps.size}
     episodes = {int(count) for run in runs for curve in run.curves.values() for count in curve.episodes}
     facts = {
         "presets": _listed(group.preset for group in groups),
         "tasks": _listed(group.task for group in groups),
         "seeds": " or ".join(_distinct(" ".join(str(run.seed) for run in group.runs) for group in groups)),
-        "budget": _listed(budget["name"] for budget in budgets),
+        "budget": _listed(run.config["budget"]["name"] for run in runs),
         "environment steps": " or ".join(f"{step:,}" for step in sorted(steps)),
         "adapter": _listed(run.adapter for run in runs),
         "episodes per evaluation": " or ".join(map(str, sorted(episodes))),
@@ -47,10 +55,6 @@ def provenance(groups: Sequence[Group], command: str) -> Provenance:
         "runs' commands": _listed(manifest.get("command", _UNKNOWN) for manifest in manifests),
     }
     return Provenance(command, commit_text(own_code()), facts)
-
-
-def _json(run: Record, name: str) -> dict:
-    return json.loads((Path(run.path) / name).read_text())
 
 
 def _listed(names: Iterable[str]) -> str:
