@@ -68,6 +68,8 @@ class Task:
     """Control mode, and what one unit of action does."""
     adapters: Mapping[str, ReadScene]
     """Readers of the scene by family: `paper` (the paper's reading), `contact` (ours)."""
+    robot: "RobotTask | None" = None
+    """What it adds where an arm does it; the suite that simulates the arm observes in the same way."""
 
 
 @runtime_checkable
@@ -174,7 +176,7 @@ class Robot(Protocol):
         """Clear a reflex and hold where the arm is now; a new epoch begins, whatever was queued is gone."""
         ...
 
-    def reset(self, position: Float[Tensor, " 3"], grip: Grip, timeout_s: float) -> None:
+    def reset(self, position: tuple[float, float, float], grip: Grip, timeout_s: float) -> None:
         """Move slowly to a start pose (m) and hold there; a new epoch begins.
 
         Raises:
