@@ -11,7 +11,7 @@ import importlib
 import pkgutil
 from types import ModuleType
 
-from hcpg.interfaces import Suite, Task
+from hcpg.interfaces import RobotPlugin, RobotTask, Suite, Task
 
 
 class UnknownNameError(LookupError):
@@ -32,7 +32,7 @@ class RefusedTaskError(LookupError):
 
 
 def names(kind: str) -> list[str]:
-    """The plug-ins of one kind (`methods`, `suites`, `tasks`) that have a file (or a folder), by name."""
+    """The plug-ins of one kind (`methods`, `suites`, `robots`, `tasks`): each a file or a folder, by name."""
     package = importlib.import_module(f"hcpg.{kind}")
     if kind != "tasks":
         return sorted(info.name for info in pkgutil.iter_modules(package.__path__))
@@ -50,6 +50,23 @@ def method(name: str) -> ModuleType:
 def suite(name: str) -> Suite:
     """The suite of that name; its simulator is imported only when an environment is made."""
     return _load("suites", name).SUITE
+
+
+def robot(name: str) -> RobotPlugin:
+    """The robot of that name; its driver is imported only when a robot is made."""
+    return _load("robots", name).ROBOT
+
+
+def robot_task(name: str) -> RobotTask:
+    """What the task `suite/name` adds where an arm does it.
+
+    Raises:
+        UnknownNameError: there is no such task, or no arm does it.
+    """
+    done = [each for each in names("tasks") if hasattr(_task_file(each), "ROBOT_TASK")]
+    if name not in done:
+        raise UnknownNameError("task of an arm", name, done)
+    return _task_file(name).ROBOT_TASK
 
 
 def task(name: str) -> Task:

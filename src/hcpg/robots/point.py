@@ -81,9 +81,10 @@ class PointArm:
         mode: Mode = "move" if self._connected else "disconnected"
         return Snapshot(
             sequence=updates, epoch=self._gate.epoch, robot_time_s=updates * STATE_PERIOD_S,
-            host_time_s=now_s, position=self._position, velocity=self._velocity, quaternion=np.array([1.0, 0.0, 0.0, 0.0]),
-            joint_angles=np.zeros(0), force=None, gripper_width_m=self._width_m, gripper_time_s=now_s,
-            gripper_refusals=0, mode=mode, success_rate=1.0,
+            host_time_s=now_s, position=self._position, velocity=self._velocity,
+            quaternion=np.array([1.0, 0.0, 0.0, 0.0]), joint_angles=np.zeros(0), force=None,
+            gripper_width_m=self._width_m, gripper_time_s=now_s, gripper_refusals=0, mode=mode,
+            success_rate=1.0,
         )  # fmt: skip
 
     def command(self, command: Command) -> Ack:
@@ -107,7 +108,7 @@ class PointArm:
         self._stay()
         return Recovery(not self._gate.closed, self._gate.closed, "there was nothing to clear")
 
-    def reset(self, position: Float[np.ndarray, " 3"], grip: Grip, timeout_s: float) -> None:
+    def reset(self, position: tuple[float, float, float], grip: Grip, timeout_s: float) -> None:
         """Be there, with the fingers as asked, after a second.
 
         Raises:
@@ -115,7 +116,7 @@ class PointArm:
         """
         if self._gate.closed:
             raise RobotError("the arm is stopped; connect again")
-        if (position != np.clip(position, LIMITS.box_low_m, LIMITS.box_high_m)).any():
+        if (np.clip(position, LIMITS.box_low_m, LIMITS.box_high_m) != position).any():
             raise RobotError(f"the start {position} is outside the box; mend the task's `home`")
         self._gate.advance()
         self.clock.sleep_until(self.clock.now_s() + 1.0)

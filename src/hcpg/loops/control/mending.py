@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from hcpg.loops.control.episodes import Crew
 from hcpg.loops.control.states import State
 from hcpg.loops.control.workers import Worker
@@ -54,8 +52,7 @@ class Mender:
 
     def reset(self) -> str:
         """Bring the arm to the task's start; a fault on the way is mended, within the limits."""
-        home, grip = np.asarray(self._crew.task.home), self._crew.task.home_grip
-        go = partial(self._robot.reset, home, grip)
+        go = partial(self._robot.reset, self._crew.task.home, self._crew.task.home_grip)
         while not self.stopped():
             _, error = self._call(go, self._patience.reset_s)
             if error is None:
