@@ -7,9 +7,9 @@ import numpy as np
 
 from hcpg.interfaces import Clock
 
-MOST_IN_A_ROW = 3
-MOST_OVERRUN_SHARE = 0.02
-"""More overruns in a row, or a larger share of an episode's ticks, and its timing does not count."""
+LONGEST_GAP = 3
+MOST_SKIPPED_SHARE = 0.02
+"""More ticks skipped in a row, or a larger share of an episode's ticks, and its timing does not count."""
 _SAME_S = 1e-9
 
 
@@ -29,10 +29,12 @@ class Timing(NamedTuple):
 
     ticks: int
     """Executed."""
-    skipped: int
     overruns: int
     """Ticks that were still busy, or still asleep, when the next one was due."""
-    overruns_in_a_row: int
+    skipped: int
+    """Deadlines that passed without a tick, because of these."""
+    longest_gap: int
+    """Most deadlines skipped in a row."""
     lateness_p50_ms: float
     lateness_p99_ms: float
     lateness_max_ms: float
@@ -41,8 +43,8 @@ class Timing(NamedTuple):
     @property
     def sound(self) -> bool:
         """Whether the timing was good enough for the episode to count."""
-        share = self.overruns / max(self.ticks, 1)
-        return self.overruns_in_a_row <= MOST_IN_A_ROW and share <= MOST_OVERRUN_SHARE
+        share = self.skipped / max(self.ticks + self.skipped, 1)
+        return self.longest_gap <= LONGEST_GAP and share <= MOST_SKIPPED_SHARE
 
 
 class Deadlines:
@@ -53,7 +55,7 @@ class Deadlines:
         self._start_s = clock.now_s()
         self._next = 0
         self._lateness_s: list[float] = []
-        self._skipped, self._overruns, self._in_a_row, self._longest = 0, 0, 0, 0
+        self._skipped, self._overruns, self._longest_gap = 0, 0, 0
 
     def wait(self) -> Tick:
         """Sleep until the next deadline that has not passed, and give its tick."""
@@ -78,12 +80,10 @@ class Deadlines:
         """What was counted so far; the lateness is NaN before the first tick."""
         late_ms = 1000 * np.asarray(self._lateness_s or [math.nan])
         p50, p99 = (float(np.percentile(late_ms, share)) for share in (50, 99))
-        counts = (len(self._lateness_s), self._skipped, self._overruns, self._longest)
+        counts = (len(self._lateness_s), self._overruns, self._skipped, self._longest_gap)
         return Timing(*counts, p50, p99, float(late_ms.max()))
 
     def _count(self, skipped: int) -> None:
+        self._overruns += skipped > 0
         self._skipped += skipped
-        overran = skipped > 0
-        self._overruns += overran
-        self._in_a_row = self._in_a_row + 1 if overran else 0
-        self._longest = max(self._longest, self._in_a_row)
+        self._longest_gap = max(self._longest_gap, skipped)

@@ -10,7 +10,7 @@ State = Literal["hold", "run", "reflex", "recover", "reconnect", "stop"]
 FOLLOWERS: Mapping[State, tuple[State, ...]] = {
     "hold": ("hold", "run", "reflex", "reconnect", "stop"),
     "run": ("run", "hold", "reflex", "reconnect", "stop"),
-    "reflex": ("recover", "reconnect", "stop"),
+    "reflex": ("reflex", "recover", "reconnect", "stop"),
     "recover": ("hold", "recover", "reconnect", "stop"),
     "reconnect": ("hold", "reconnect", "stop"),
     "stop": ("stop",),

@@ -15,6 +15,8 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+
 RESERVE_BYTES = 1 << 20
 """Room set aside: about a hundred steps of the largest kind."""
 MOST_WAITING = 300
@@ -43,12 +45,12 @@ def _opened(path: Path) -> Sink:
 
 
 class StepLog:
-    """Appends rows to `path`; `put` never waits."""
+    """Appends rows to `path`."""
 
     def __init__(
         self, path: Path, open_sink: Callable[[Path], Sink] = _opened, threaded: bool = True
     ) -> None:
-        """Without `threaded`, rows are written by `write_waiting` alone.
+        """Without `threaded`, `put` writes at once: for clocks that stand still meanwhile.
 
         Raises:
             LogError: there is not even room for the reserve.
@@ -69,10 +71,12 @@ class StepLog:
             self._thread.start()
 
     def put(self, row: Mapping[str, Any]) -> None:
-        """Have `row` written; numbers that are not finite become null, arrays lists, named tuples objects."""
+        """Have `row` written, later; what is not finite becomes null, a named tuple an object."""
         self._rows.append(row)
         if len(self._rows) > MOST_WAITING:
             self.failure = self.failure or f"{len(self._rows)} steps wait for the disk; it is too slow"
+        if self._thread is None:
+            self.write_waiting()
         self._wanted.set()
 
     def write_waiting(self) -> bool:
@@ -138,19 +142,26 @@ class StepLog:
 
 def plain(value: Any) -> Any:
     """`value` as JSON can hold it; of what it has no word for, the text that Python prints."""
-    if hasattr(value, "_asdict"):
-        return plain(value._asdict())
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, (int, str)) or value is None:
+        return value
+    if isinstance(value, (np.ndarray, np.generic)):
+        return _plain_array(np.asarray(value))
     if isinstance(value, Mapping):
         return {name: plain(each) for name, each in value.items()}
+    if hasattr(value, "_asdict"):
+        return {name: plain(each) for name, each in value._asdict().items()}
     if isinstance(value, (list, tuple)):
         return [plain(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value if isinstance(value, (bool, int, float, str)) or value is None else repr(value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    return repr(value)
+
+
+def _plain_array(array: np.ndarray) -> Any:
+    is_number = array.dtype.kind in "biuf"
+    return array.tolist() if is_number and np.isfinite(array).all() else plain(array.tolist())
 
 
 def _line(row: Mapping[str, Any]) -> bytes:

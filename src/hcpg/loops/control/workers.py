@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 from hcpg.interfaces import Clock
+from hcpg.safety.clock import MachineClock
 
 
 class Answer(NamedTuple):
@@ -106,3 +107,8 @@ class ThreadWorker:
             with self._changed:
                 self._call, self._done = None, (ticket, answer)
                 self._changed.notify_all()
+
+
+def worker_for(clock: Clock, name: str) -> Worker:
+    """A thread where time passes by itself; where it stands still meanwhile, the caller's own thread."""
+    return ThreadWorker(clock, name) if isinstance(clock, MachineClock) else InlineWorker(clock)

@@ -1,4 +1,4 @@
-"""The clock of this machine."""
+"""The clock of this machine, for robots that do not bring one."""
 
 import time
 
