@@ -10,6 +10,7 @@ import time
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 ENVIRONMENT = {
@@ -146,6 +147,25 @@ def memory() -> list[tuple[str, float, str]]:
     return [("memory of the demo at its peak, GiB", peak / 2**30, "< 2")]
 
 
+def maniskill_stepping() -> list[tuple[str, float, str]]:
+    """Our steps of ManiSkill's tasks against its own behind CPUGymWrapper, resets apart and included."""
+    print(
+        f"  mani-skill {version('mani-skill')}, torch {version('torch')}; times of the processor, one thread"
+    )
+    rows = []
+    for answer in _one("maniskill_stepping"):
+        name = f"{answer['task']}, {answer['mode']}"
+        print(
+            f"  {name}: {answer['stock_step_us']:.0f} us a step, ours {answer['our_step_us']:.0f};", end=" "
+        )
+        print(
+            f"{answer['our_reset_us']:.0f} us a reset; numbers differ by {answer['largest_difference']:.0e}"
+        )
+        rows.append((f"{name}: a step of ManiSkill / ours, time", answer["ratio"], ">= 2"))
+        rows.append((f"{name}: the same with resets", answer["episode_ratio"], ">= 2"))
+    return rows
+
+
 def _proportional_bytes(pid: int) -> float:
     """Memory of a process and all its children; a shared page counts once (PSS)."""
     import psutil
@@ -159,13 +179,16 @@ def _proportional_bytes(pid: int) -> float:
     return total
 
 
-def _one(module: str) -> dict:
+def _one(module: str) -> Any:
     command = [sys.executable, "-m", f"benchmarks.{module}"]
     answer = subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, check=True, capture_output=True, text=True)
     return json.loads(answer.stdout.strip().splitlines()[-1])
 
 
-PARTS = {part.__name__: part for part in (gradient_steps, methods, pool, training, selection, memory)}
+PARTS = {
+    part.__name__: part
+    for part in (gradient_steps, methods, pool, training, selection, memory, maniskill_stepping)
+}
 
 
 def main() -> None:
