@@ -22,6 +22,7 @@ def test_two_halves_and_a_stop_equal_one_sitting_bit_for_bit(straight, tmp_path)
     whole, _ = straight
     half = tiny_settings(steps=STEPS // 2, evaluations=1)
     [folder] = sitting.create_folders(half, [1], tmp_path)
+    folder.append("episodes", [{"step": 40, "phase": "train"}])  # killed before its first checkpoint
     asked = []
     sit(half, [folder], stop=lambda: asked.append(None) or len(asked) > 17)
     assert folder.status()["state"] == "stopped"

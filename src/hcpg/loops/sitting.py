@@ -8,9 +8,10 @@ from pathlib import Path
 from hcpg import presets, registry
 from hcpg.loops.journal import Journal, Notify
 from hcpg.loops.manifest import collect
+from hcpg.loops.pool import Pool
 from hcpg.loops.runs import RunFolder
 from hcpg.loops.saving import Saver, restore
-from hcpg.loops.training import Trainer
+from hcpg.loops.training import Position, Trainer
 from hcpg.presets import Settings
 
 EXTENDABLE = ("budget.steps", "budget.evaluations")
@@ -68,8 +69,7 @@ def sit(
         with _failure_noted(folders):
             trainer = Trainer(settings, seeds, journal, workers)
             pool = stack.enter_context(trainer.pool())
-            resumes = any(any(folder.checkpoints.glob("step_*")) for folder in folders)
-            position = restore(trainer, folders, pool) if resumes else trainer.fresh(pool)
+            position = _position(trainer, folders, pool)
             for folder in folders:
                 folder.set_config(settings.as_json())
                 folder.set_status("running", step=trainer.step(position))
@@ -77,6 +77,15 @@ def sit(
         done = position.tick >= trainer.schedule.ticks()
         journal.ended("finished" if done else "stopped", trainer.step(position))
         return journal.alive
+
+
+def _position(trainer: Trainer, folders: list[RunFolder], pool: Pool) -> Position:
+    """Where the runs go on: at their checkpoints, or at the beginning if they have none."""
+    if any(any(folder.checkpoints.glob("step_*")) for folder in folders):
+        return restore(trainer, folders, pool)
+    for folder in folders:
+        folder.rewind(0)  # a sitting that was killed before its first checkpoint may have left rows
+    return trainer.fresh(pool)
 
 
 @contextmanager
