@@ -20,6 +20,8 @@ from hcpg.safety.limiting import Motion, limit, outside_m
 
 POLICY_SHARE = 0.8
 """Part of a period within which the policy has to answer; what is left is for limits and the command."""
+PATIENCE_S = 1.0
+"""Held for so much longer than it may act, an episode ends."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Episode:
     """One episode; `run` goes through it once."""
 
     def __init__(self, crew: Crew, number: int, start: int, horizon: int) -> None:
-        """`horizon` is the most actions; an episode that is held as long as it acts ends, too."""
+        """`horizon` is the most actions; an episode that is held longer than that ends, too."""
         self._crew, self._robot, self._limits = crew, crew.rig.robot, crew.rig.robot.limits
         self._number, self._start, self._horizon = number, start, horizon
         self._period_s = 1.0 / self._limits.rate_hz
@@ -108,7 +110,8 @@ class Episode:
             return "stopped" if record.verdict.state == "stop" else "fault"
         if record.success:
             return "success"
-        if len(self._records) - self._actions >= self._horizon:
+        held_s = (len(self._records) - self._actions) * self._period_s
+        if held_s > self._horizon * self._period_s + PATIENCE_S:
             return "fault"
         return "time_limit" if self._actions >= self._horizon else None
 
@@ -130,9 +133,9 @@ class Episode:
         if choice.unfit:
             return _not_done(record, choice.unfit)
         now_s = self._robot.clock.now_s()
-        first = self._last_target is None
-        elapsed_s = self._period_s if first else now_s - self._last_command_s
-        motion = Motion(self._last_target, elapsed_s, now_s - self._running_since_s)
+        if self._last_target is None:  # the first one after a hold
+            self._running_since_s, self._last_command_s = now_s, now_s - self._period_s
+        motion = Motion(self._last_target, now_s - self._last_command_s, now_s - self._running_since_s)
         limited = limit(choice.action, record.snapshot, self._limits, motion)
         number = next(self._crew.sequence)
         ack = self._robot.command(Command(number, record.snapshot.epoch, limited.position, limited.grip))
@@ -146,8 +149,7 @@ class Episode:
     def _held(self) -> None:
         """Hold at this tick; whatever comes next begins with short steps."""
         self._robot.hold()
-        now_s = self._robot.clock.now_s()
-        self._last_target, self._last_command_s, self._running_since_s = None, now_s, now_s
+        self._last_target = None
 
     def _written(self, record: StepRecord) -> None:
         self._crew.machine.move(record.verdict.state)

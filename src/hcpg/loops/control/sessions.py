@@ -1,7 +1,7 @@
 """Episode after episode on one robot; however it ends, the robot is stopped and let go."""
 
 from collections.abc import Iterable
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 from hcpg.loops.control.episodes import Crew, Episode
 from hcpg.loops.control.mending import Mender, Patience
@@ -11,6 +11,7 @@ from hcpg.loops.control.workers import Worker
 Purpose = Literal["train", "evaluate"]
 
 
+@runtime_checkable
 class Learner(Protocol):
     """The learner's process, as the robot's process sees it."""
 

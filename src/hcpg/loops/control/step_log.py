@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -28,6 +28,7 @@ class LogError(RuntimeError):
     """Steps that are not on the disk; the message says how many, why, and where there is room needed."""
 
 
+@runtime_checkable
 class Sink(Protocol):
     """Where bytes go; what an unbuffered file offers."""
 
@@ -120,9 +121,10 @@ class StepLog:
 
     def _reserve_given_back(self) -> bool:
         """Free the reserve; gives whether it was there, so that another try makes sense."""
-        there = self._full and self._reserve.exists()
-        self._reserve.unlink(missing_ok=True)
-        return there
+        if not self._full or not self._reserve.exists():
+            return False
+        self._reserve.unlink()
+        return True
 
     def _set_aside(self) -> None:
         self._full = False

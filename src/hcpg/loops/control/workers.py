@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from hcpg.interfaces import Clock
 from hcpg.safety.clock import MachineClock
@@ -17,6 +17,7 @@ class Answer(NamedTuple):
     took_s: float
 
 
+@runtime_checkable
 class Worker(Protocol):
     """Makes one call at a time. An answer is had under its own ticket only, so an old one is never read."""
 
