@@ -45,7 +45,11 @@ def read_paper_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
 
 
 def read_contact_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
-    """The hand grasps the peg; the peg's head goes in line with the cube, then pushes it to the goal."""
+    """The hand grasps the peg; the peg's head goes in line with the cube, then pushes it to the goal.
+
+    The tool is the hand, and the peg's head once the fingers hold the peg. A cube that was pushed too far is
+    let be: a peg can push, and not pull.
+    """
     tool, cube, peg = observation[..., TOOL], observation[..., CUBE], observation[..., PEG]
     head, goal, xp = peg_head(observation), goal_of(observation), namespace(observation)
     width = xp.abs(observation[..., FINGERS] - HALF_PEG_WIDTH_M)
@@ -55,8 +59,10 @@ def read_contact_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
     short = (cube - head)[..., 0] - HALF_CUBE_M > STANDOFF_M
     aligns = flag((xp.abs(aside) > ALIGNED_M) & short, observation)
     still = 0.0 * head
-    task = moved(still, x=(1.0 - aligns) * (goal - cube)[..., 0], y=aligns * aside)
-    return Scene(tool, cube, goal, peg - tool, task, contact)
+    ahead = xp.clip((goal - cube)[..., 0], 0.0, None)
+    task = moved(still, x=(1.0 - aligns) * ahead, y=aligns * aside)
+    point = xp.where(contact[..., None] > 0.5, head, tool)
+    return Scene(point, cube, goal, peg - tool, task, contact)
 
 
 TASK = Task(
