@@ -3,7 +3,8 @@
 import pytest
 from tiny_cells import cell
 
-from hcpg.experiments.ledger import entries, hours_left
+from hcpg.experiments.claims import claim_of, locked
+from hcpg.experiments.ledger import entries, newest_checkpoint, recorded
 from hcpg.loops.runs import RunFolder
 
 
@@ -60,12 +61,22 @@ def test_of_several_runs_of_a_cell_the_newest_counts(tmp_path):
     assert entries([cell(0)], tmp_path)[0].folder == late
 
 
-def test_the_time_left_is_what_finished_runs_took(tmp_path):
-    cells = [cell(seed) for seed in range(4)]
-    assert hours_left(entries(cells, tmp_path), 2) is None
-    make(tmp_path, cells[0], "finished", wall_s=1800.0)
-    make(tmp_path, cells[1], "finished", wall_s=5400.0)
-    assert hours_left(entries(cells, tmp_path), 2) == pytest.approx(1.0)
-    make(tmp_path, cells[2], "finished", wall_s=3600.0)
-    make(tmp_path, cells[3], "diverged")
-    assert hours_left(entries(cells, tmp_path), 2) == 0.0
+def test_a_claimed_cell_is_running_even_before_it_has_a_folder_and_a_finished_one_is_finished(tmp_path):
+    make(tmp_path, cell(1), "finished")
+    claims = [locked(claim_of(cell(seed), tmp_path)) for seed in (0, 1)]
+    assert states([cell(0), cell(1)], tmp_path) == ["running", "finished"]
+    assert [entry.state for entry in recorded([cell(0), cell(1)], tmp_path)] == ["left", "finished"]
+    for claim in claims:
+        claim.close()
+    assert states([cell(0)], tmp_path) == ["left"]
+
+
+def test_an_entry_tells_how_far_its_run_is(tmp_path):
+    folder = make(tmp_path, cell(0), "stopped", wall_s=8.0)
+    folder.append("metrics", [{"step": 32, "wall_s": 9.5}])
+    [entry] = entries([cell(0)], tmp_path)
+    assert (entry.step, entry.seconds) == (32, 9.5)
+    assert newest_checkpoint(folder.path) is None
+    for step in (8, 32):
+        (folder.checkpoints / f"step_{step:09d}").mkdir()
+    assert newest_checkpoint(folder.path) == 32

@@ -1,27 +1,29 @@
-"""`hcpg experiment`: make the runs of a table, or see how far they are."""
+"""`hcpg experiment`: make the runs of a table, on one machine or a cluster, or see how far they are."""
 
 import argparse
 import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
+from hcpg.commands import report
+from hcpg.commands.options import check
 from hcpg.experiments import engine, ledger
-from hcpg.experiments.protocols import PROTOCOLS, protocol
+from hcpg.experiments.forecast import hours_left
+from hcpg.experiments.protocols import PROTOCOLS, Protocol, protocol
 
-DESCRIPTION = """Run the missing runs of an experiment, one a core, or show which are done. A finished run is
-not repeated, a stopped one is resumed, and launches at once share the work. Runs lie in OUT/NAME."""
+DESCRIPTION = """Run the missing runs of an experiment, one a core (on a GPU: the seeds of a preset together),
+or show which are done. A finished run is not repeated, a stopped or lost one is resumed, and launches at once
+share the work. Runs lie in OUT/NAME, the report of a complete experiment in OUT/NAME/report."""
 BY_SIGNAL = 128
 
 
 def run(arguments: Sequence[str]) -> int:
     """Carry out `run`, `status` or `list`; gives the exit code."""
-    parser = argparse.ArgumentParser(prog="hcpg experiment", description=DESCRIPTION)
-    parser.add_argument("action", choices=("run", "status", "list"))
-    parser.add_argument("name", nargs="?", metavar="NAME", help="`hcpg experiment list` shows all")
-    parser.add_argument("--out", type=Path, default=Path("results"), help="default: results")
-    parser.add_argument("--cores", type=int, help="runs at a time; default: as many as there are cores")
+    parser = _parser()
     options = parser.parse_args(arguments)
     if options.action == "list":
         return _list()
@@ -30,14 +32,71 @@ def run(arguments: Sequence[str]) -> int:
     cores = sorted(os.sched_getaffinity(0))
     if options.cores is not None and not 1 <= options.cores <= len(cores):
         parser.error(f"--cores {options.cores}: this process may use 1 to {len(cores)}")
-    cores = cores[: options.cores]
-    cells, results = protocol(options.name).cells(), options.out / options.name
+    if options.gpus_per_job is not None and not 0 <= options.gpus_per_job <= 1:
+        parser.error(f"--gpus-per-job {options.gpus_per_job}: a share of one card, from 0 (none) to 1")
+    if options.cores_per_job < 1:
+        parser.error(f"--cores-per-job {options.cores_per_job}: a job needs at least one")
+    options.cores = cores[: options.cores]
+    chosen = protocol(options.name)
+    if options.seeds:
+        chosen = replace(chosen, seeds=tuple(dict.fromkeys(options.seeds)))
     if options.action == "status":
-        return _status(ledger.entries(cells, results), len(cores))
-    ended = engine.run(cells, results, cores, _say)
+        return _status(ledger.entries(chosen.cells(), options.out / options.name), len(options.cores))
+    return _run(options, chosen)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="hcpg experiment", description=DESCRIPTION)
+    add = parser.add_argument
+    add("action", choices=("run", "status", "list"))
+    add("name", nargs="?", metavar="NAME", help="`hcpg experiment list` shows all")
+    add("--out", type=Path, default=Path("results"), help="default: results")
+    add("--seeds", type=int, nargs="+", help="others than the experiment's own, to settle what is undecided")
+    add("--cores", type=int, help="cores of this machine to use, one run on each; default: all")
+    add(
+        "--gpus-per-job",
+        type=float,
+        metavar="SHARE",
+        help="0.5: two jobs on a card, 0: train on cores; default: 1 where this machine has a GPU, else 0",
+    )
+    add("--ray", metavar="ADDRESS", help="run on this Ray cluster (docs/cluster.md), e.g. auto or HOST:6379")
+    add("--cores-per-job", type=int, default=1, help="with --ray: cores that a job gets; default: 1")
+    add("--no-report", action="store_true", help="do not write the report when all runs are done")
+    return parser
+
+
+def _run(options: argparse.Namespace, chosen: Protocol) -> int:
+    for settings in chosen.settings():
+        check(settings)
+    cells, results = chosen.cells(), options.out / options.name
+    with closing(_place(options)) as place:
+        ended = engine.run(cells, results, place, _say)
     if ended.signal is not None:
         return BY_SIGNAL + ended.signal
-    return 1 if ended.failed else _status(ledger.entries(cells, results), len(cores))
+    entries = ledger.entries(cells, results)
+    _status(entries, len(options.cores))
+    if ended.failed:
+        return 1
+    if options.no_report or any(entry.state not in ledger.DONE for entry in entries):
+        return 0
+    return report.run([str(results)])
+
+
+def _place(options: argparse.Namespace) -> engine.Place:
+    """What the jobs run on."""
+    from hcpg.experiments import local, slots
+    from hcpg.loops import machine
+
+    share = options.gpus_per_job
+    if options.ray is not None:
+        from hcpg.experiments.cluster import RayCluster
+
+        return RayCluster(options.ray, gpus_per_job=share or 0.0, cores_per_job=options.cores_per_job)
+    if share is None:
+        share = 1.0 if machine.has_accelerator() else 0.0
+    if share == 0.0:
+        return local.ThisMachine(slots.core_slots(options.cores), together=False)
+    return local.ThisMachine(slots.card_slots(slots.cards(), share, options.cores), together=True)
 
 
 def _say(text: str) -> None:
@@ -57,14 +116,28 @@ def _status(entries: list[ledger.Entry], slots: int) -> int:
     lines: dict[str, list[str]] = {}
     for entry in entries:
         chosen = entry.cell.settings
-        lines.setdefault(f"{chosen.task} {chosen.preset}", []).append(f"s{entry.cell.seed} {entry.state}")
+        lines.setdefault(f"{chosen.task} {chosen.preset}", []).append(f"s{entry.cell.seed} {_words(entry)}")
     width = max(map(len, lines))
     for name, states in lines.items():
-        sys.stdout.write(f"{name:{width}}  {', '.join(states)}\n")
+        _say(f"{name:{width}}  {', '.join(states)}")
     counts = Counter(entry.state for entry in entries)
-    hours = ledger.hours_left(entries, slots)
-    left = "" if counts.keys() <= set(ledger.DONE) else ", time left unknown before a run has finished"
-    if left and hours is not None:
-        left = f", about {hours:.1f} hours left on {slots} cores"
-    sys.stdout.write(", ".join(f"{count} {state}" for state, count in counts.items()) + left + "\n")
+    _say(", ".join(f"{count} {state}" for state, count in counts.items()) + _time_left(entries, slots))
     return 0
+
+
+def _words(entry: ledger.Entry) -> str:
+    """The entry's state, and how far it is if it is between beginning and end."""
+    if entry.state not in ("running", "stopped", "failed") or entry.step == 0:
+        return entry.state
+    return f"{entry.state} at {100 * entry.step // entry.cell.settings.budget.steps} %"
+
+
+def _time_left(entries: list[ledger.Entry], cores: int) -> str:
+    """What to expect of the runs that are left, with as many at a time as there are now."""
+    if all(entry.state in ledger.DONE for entry in entries):
+        return ""
+    running = sum(entry.state == "running" for entry in entries)
+    hours = hours_left(entries, running or cores)
+    if hours is None:
+        return ", time left unknown before a run has learned for a while"
+    return f", about {hours:.1f} hours left, {running or cores} at a time"

@@ -1,37 +1,64 @@
-"""Run what an experiment lacks: one `hcpg train` a core; several launches at once share the work."""
+"""Run what an experiment lacks, job by job, wherever there is room; launches at once share the work."""
 
-import fcntl
-import hashlib
-import os
-import signal
-import subprocess
-import sys
 import time
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from io import TextIOWrapper
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
-from hcpg.experiments.ledger import DONE, Entry, entries, identity
+from hcpg.experiments.claims import claim_of, locked
+from hcpg.experiments.ledger import DONE, entries, recorded
 from hcpg.experiments.protocols import Cell
+from hcpg.experiments.units import Unit, units
 from hcpg.loops.stops import Stops
-from hcpg.presets import differences
 
 POLL_S = 0.5
 STATES = {0: "finished", 3: "diverged"}
 """Exit codes of `hcpg train` after which nothing is left to do."""
+LOST = 256
+"""In place of an exit code, which are smaller: the job is gone with its machine."""
+MOST_LOSSES = 3
+"""Machines that a unit may lose before it counts as failed: it may be what kills them."""
 
 
-class Job(NamedTuple):
-    """A run under way in a process of its own."""
+@runtime_checkable
+class Job(Protocol):
+    """A unit in training."""
 
-    cell: Cell
-    process: subprocess.Popen[bytes]
-    core: int
-    claim: TextIOWrapper
-    """Open and locked while the job runs: no other launch takes this cell."""
-    log: Path
-    began: float
+    @property
+    def place(self) -> str:
+        """Where it runs, in a word or two."""
+        ...
+
+    def poll(self) -> int | None:
+        """The exit code, or `LOST`; None while it runs."""
+        ...
+
+    def stop(self, *, at_once: bool) -> None:
+        """Let it save and end, or kill it."""
+        ...
+
+
+@runtime_checkable
+class Place(Protocol):
+    """What jobs run on."""
+
+    together: bool
+    """Whether the seeds of a configuration make one job."""
+
+    def room(self) -> bool:
+        """Whether one more job can be started."""
+        ...
+
+    def start(self, unit: Unit, results: Path, claims: list[TextIOWrapper]) -> Job:
+        """Train the unit; there is room. The job holds the claims, too, if it can outlive this process."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it; jobs that cannot outlive this process end."""
+        ...
 
 
 class Ended(NamedTuple):
@@ -42,93 +69,105 @@ class Ended(NamedTuple):
     """The signal that stopped it, if one did."""
 
 
-def run(cells: list[Cell], results: Path, cores: list[int], say: Callable[[str], None]) -> Ended:
-    """Train every cell that is not done, one on each of `cores` at a time.
+def run(cells: list[Cell], results: Path, place: Place, say: Callable[[str], None]) -> Ended:
+    """Train every cell that is not done.
 
-    A finished run is never repeated, a stopped or failed one is resumed, and one that another launch is at is
-    left to it. SIGINT or SIGTERM lets every run save, and ends.
+    A finished run is never repeated, a stopped, failed or lost one is resumed from its last checkpoint, and
+    one that another launch is at is left to it. SIGINT or SIGTERM lets every run save, and ends.
     """
-    (results / ".claims").mkdir(parents=True, exist_ok=True)
     waiting = [each for each in entries(cells, results) if each.state not in DONE]
     say(f"{len(cells) - len(waiting)} of {len(cells)} runs are done, {len(waiting)} are left")
-    jobs: list[Job] = []
-    failed: list[Cell] = []
+    launch = _Launch(results, place, say, [unit.cells for unit in units(waiting, place.together)])
     with Stops() as stops:
         told = 0
-        while jobs or (waiting and not stops.count):
-            free = [core for core in cores if core not in {job.core for job in jobs}]
-            while free and waiting and not stops.count:
-                job = _started(waiting.pop(0), results, free[0])
-                if job is not None:
-                    say(f"{label(job.cell)}: started on core {free.pop(0)}")
-                    jobs.append(job)
+        while launch.running or (launch.waiting and not stops.count):
+            if not stops.count:
+                launch.fill()
             time.sleep(POLL_S)
             if told < stops.count:
                 told = stops.count
-                _stop(jobs, at_once=told > 1)
-            for job in [job for job in jobs if job.process.poll() is not None]:
-                jobs.remove(job)
-                failed += _ended(job, say, stopping=told > 0)
-    return Ended(failed, stops.first)
+                launch.stop(at_once=told > 1)
+            launch.collect()
+    return Ended(launch.failed, stops.first)
 
 
-def label(cell: Cell) -> str:
-    """A cell in a few words."""
-    return f"{cell.settings.task} {cell.settings.preset} s{cell.seed}"
+class _Running(NamedTuple):
+    unit: Unit
+    job: Job
+    claims: list[TextIOWrapper]
+    began: float
 
 
-def command(entry: Entry, results: Path) -> list[str]:
-    """The `hcpg` arguments that make or continue the entry's run."""
-    chosen = entry.cell.settings
-    if entry.folder is not None:
-        return ["train", "--resume", str(entry.folder)]
-    names = ["--task", chosen.task, "--preset", chosen.preset, "--budget", chosen.budget.name]
-    places = ["--seeds", str(entry.cell.seed), "--out", str(results)]
-    return ["train", *names, *places, *differences(chosen)]
+@dataclass
+class _Launch:
+    """What is still to do, what runs, and what failed."""
 
+    results: Path
+    place: Place
+    say: Callable[[str], None]
+    waiting: list[list[Cell]]
+    running: list[_Running] = field(default_factory=list)
+    failed: list[Cell] = field(default_factory=list)
+    _losses: Counter[tuple[str, int]] = field(default_factory=Counter)
+    _stopping: bool = False
+    _waits: bool = False
 
-def _started(entry: Entry, results: Path, core: int) -> Job | None:
-    """The job, or None if another launch has the cell, or has done it meanwhile."""
-    claim = _claimed(entry.cell, results)
-    if claim is None:
-        return None
-    entry = entries([entry.cell], results)[0]
-    if entry.state in (*DONE, "running"):
-        claim.close()
-        return None
-    log = results / "logs" / f"{label(entry.cell).replace('/', '-').replace(' ', '_')}.txt"
-    log.parent.mkdir(exist_ok=True)
-    arguments = [sys.executable, "-m", "hcpg", *command(entry, results)]
-    with log.open("ab") as file:
-        process = subprocess.Popen(arguments, stdout=file, stderr=file, start_new_session=True)
-    os.sched_setaffinity(process.pid, {core})  # its own processes inherit it
-    return Job(entry.cell, process, core, claim, log, time.monotonic())
+    def fill(self) -> None:
+        """Start jobs while there is room."""
+        while self.waiting and self.place.room():
+            self._start(self.waiting.pop(0))
+        idle = bool(self.waiting) and not self.running
+        if idle and not self._waits:
+            self.say("no room at present; waiting for a place to get free")
+        self._waits = idle
 
+    def stop(self, *, at_once: bool) -> None:
+        """Let every job save and end, or kill them."""
+        self._stopping = True
+        for each in self.running:
+            each.job.stop(at_once=at_once)
 
-def _claimed(cell: Cell, results: Path) -> TextIOWrapper | None:
-    digest = hashlib.sha256(repr(identity(cell)).encode()).hexdigest()
-    file = (results / ".claims" / digest).open("a")
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        file.close()
-        return None
-    return file
+    def collect(self) -> None:
+        """Take leave of the jobs that have ended."""
+        for each in list(self.running):
+            code = each.job.poll()
+            if code is not None:
+                self.running.remove(each)
+                for claim in each.claims:
+                    claim.close()
+                self._note_end(each, code)
 
+    def _start(self, cells: list[Cell]) -> None:
+        """Train what is left of the cells once they are claimed; another launch may have come first."""
+        tried = {cell.identity(): locked(claim_of(cell, self.results)) for cell in cells}
+        claims = {identity: claim for identity, claim in tried.items() if claim is not None}
+        mine = [cell for cell in cells if cell.identity() in claims]
+        left = [each for each in recorded(mine, self.results) if each.state not in (*DONE, "running")]
+        found = units(left, self.place.together)
+        self.waiting[:0] = [unit.cells for unit in found[1:]]
+        held = [claims.pop(cell.identity()) for unit in found[:1] for cell in unit.cells]
+        for claim in claims.values():
+            claim.close()
+        for unit in found[:1]:
+            job = self.place.start(unit, self.results, held)
+            self.say(f"{unit.label}: started on {job.place}")
+            self.running.append(_Running(unit, job, held, time.monotonic()))
 
-def _stop(jobs: list[Job], *, at_once: bool) -> None:
-    for job in jobs:
-        if at_once:
-            os.killpg(job.process.pid, signal.SIGKILL)
-        else:
-            job.process.send_signal(signal.SIGTERM)
+    def _note_end(self, ended: _Running, code: int) -> None:
+        unit, minutes = ended.unit, (time.monotonic() - ended.began) / 60
+        goes_on = code == LOST and not self._stopping and self._may_go_on(unit)
+        sound = code in STATES or goes_on or self._stopping
+        word = STATES.get(code, "saved" if self._stopping else f"failed with exit code {code}")
+        if code == LOST:
+            word = f"lost with {ended.job.place}" + (", goes on elsewhere" if goes_on else "")
+        end = "" if sound else f", see {self.results / unit.log}"
+        self.say(f"{unit.label}: {word} after {minutes:.1f} minutes{end}")
+        if goes_on:
+            self.waiting.insert(0, unit.cells)
+        if not sound:
+            self.failed += unit.cells
 
-
-def _ended(job: Job, say: Callable[[str], None], *, stopping: bool) -> list[Cell]:
-    """Say how the job ended; gives its cell if it failed."""
-    job.claim.close()
-    code, minutes = job.process.returncode, (time.monotonic() - job.began) / 60
-    sound = code in STATES or stopping
-    state = STATES.get(code, "saved" if stopping else f"failed with exit code {code}")
-    say(f"{label(job.cell)}: {state} after {minutes:.1f} minutes{'' if sound else f', see {job.log}'}")
-    return [] if sound else [job.cell]
+    def _may_go_on(self, unit: Unit) -> bool:
+        """Note a loss; whether the unit's runs have not been lost too often."""
+        self._losses.update(cell.identity() for cell in unit.cells)
+        return max(self._losses[cell.identity()] for cell in unit.cells) < MOST_LOSSES

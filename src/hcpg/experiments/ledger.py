@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from hcpg.experiments.claims import claim_of, is_locked
 from hcpg.experiments.protocols import Cell
 from hcpg.loops.runs import RunFolder
 from hcpg.report.records import find_runs
@@ -19,26 +20,37 @@ class Entry(NamedTuple):
     state: State
     """`left`: not begun; `stopped`: to be resumed."""
     folder: Path | None = None
-    seconds: float | None = None
-    """Training time of a finished run, over all its sittings."""
+    step: int = 0
+    """Environment steps of the newest row of metrics."""
+    seconds: float = 0.0
+    """Training time up to there, over all sittings."""
 
 
 def entries(cells: list[Cell], results: Path) -> list[Entry]:
-    """Every cell with its state, in the order of the cells.
+    """Every cell with its state, in the order of the cells; `running` where any launch is at it."""
+    return [
+        entry if entry.state in DONE or not is_locked(claim_of(entry.cell, results)) else _at_work(entry)
+        for entry in recorded(cells, results)
+    ]
+
+
+def recorded(cells: list[Cell], results: Path) -> list[Entry]:
+    """The same by what the run folders alone say.
 
     A run belongs to a cell if its whole configuration and its seed are the cell's; of several the newest
     counts.
     """
-    found = {_key(RunFolder(path)): path for path in find_runs(results)} if results.exists() else {}
-    return [_entry(cell, found.get(identity(cell))) for cell in cells]
+    found = {_identity(RunFolder(path)): path for path in find_runs(results)} if results.exists() else {}
+    return [_entry(cell, found.get(cell.identity())) for cell in cells]
 
 
-def identity(cell: Cell) -> tuple[str, int]:
-    """What a run must have to be the cell's: its whole configuration, and its seed."""
-    return json.dumps(cell.settings.as_json(), sort_keys=True), cell.seed
+def newest_checkpoint(folder: Path) -> int | None:
+    """The environment step of a run's newest checkpoint; None if it has none."""
+    steps = [int(path.stem.removeprefix("step_")) for path in (folder / "checkpoints").glob("step_*")]
+    return max(steps, default=None)
 
 
-def _key(folder: RunFolder) -> tuple[str, int]:
+def _identity(folder: RunFolder) -> tuple[str, int]:
     return json.dumps(folder.config(), sort_keys=True), int(folder.manifest()["run"]["seed"])
 
 
@@ -49,26 +61,13 @@ def _entry(cell: Cell, path: Path | None) -> Entry:
     state = folder.status()["state"]
     if state == "running" and not folder.in_use():
         state = "stopped"  # its process died without a word
-    return Entry(cell, state, path, _seconds(folder) if state == "finished" else None)
-
-
-def _seconds(folder: RunFolder) -> float | None:
     rows = folder.rows("metrics")
-    return float(rows[-1]["wall_s"]) if rows else None
+    return (
+        Entry(cell, state, path, rows[-1]["step"], float(rows[-1]["wall_s"]))
+        if rows
+        else Entry(cell, state, path)
+    )
 
 
-def hours_left(entries: list[Entry], slots: int) -> float | None:
-    """Hours until all is done on `slots` cores, from what finished runs of the same preset took.
-
-    None before any run has finished.
-    """
-    taken: dict[str, list[float]] = {}
-    for entry in entries:
-        if entry.seconds is not None:
-            taken.setdefault(entry.cell.settings.preset, []).append(entry.seconds)
-    if not taken:
-        return None
-    means = {preset: sum(each) / len(each) for preset, each in taken.items()}
-    usual = sum(means.values()) / len(means)
-    open_ends = [entry.cell.settings.preset for entry in entries if entry.state not in DONE]
-    return sum(means.get(preset, usual) for preset in open_ends) / slots / 3600
+def _at_work(entry: Entry) -> Entry:
+    return entry._replace(state="running")

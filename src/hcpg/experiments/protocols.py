@@ -1,5 +1,6 @@
 """Which runs make up a table: tasks, presets, seeds and a budget, chosen before anything is trained."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -42,6 +43,10 @@ class Cell(NamedTuple):
 
     settings: Settings
     seed: int
+
+    def identity(self) -> tuple[str, int]:
+        """What a run must have to be the cell's: its whole configuration, and its seed."""
+        return json.dumps(self.settings.as_json(), sort_keys=True), self.seed
 
 
 @dataclass(frozen=True)
