@@ -9,7 +9,16 @@ set -euo pipefail
 readonly opengl_packages=(libegl1 libgl1-mesa-dri)
 readonly vulkan_packages=(libvulkan1 mesa-vulkan-drivers) oldest_driver=24
 readonly backports_list=${APT_SOURCES:-/etc/apt/sources.list.d}/hcpg-flow-backports.list
-readonly debian_keys=/usr/share/keyrings/debian-archive-keyring.gpg
+readonly debian_keys=/usr/share/keyrings/debian-archive-keyring.gpg os_release=${OS_RELEASE:-/etc/os-release}
+
+refuse() {
+    echo "$*" >&2
+    exit 1
+}
+
+as_root() {
+    if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi
+}
 
 installed_version() { # installed_version PACKAGE: empty where it is not installed
     local status
@@ -17,40 +26,25 @@ installed_version() { # installed_version PACKAGE: empty where it is not install
     [ "${status%% *}" != installed ] || echo "${status#* }"
 }
 
-is_new_enough() { # is_new_enough PACKAGE VERSION
+offered_version() { # offered_version PACKAGE: what apt would install; empty where it knows none
+    LC_ALL=C apt-cache policy "$1" | sed -n 's/^ *Candidate: *//p' | sed 's/(none)//'
+}
+
+suffices() { # suffices PACKAGE VERSION
     [ -n "$2" ] && { [ "$1" != mesa-vulkan-drivers ] || dpkg --compare-versions "$2" ge "$oldest_driver"; }
 }
 
-candidate() { # candidate PACKAGE: the version that apt would install
-    apt-cache policy "$1" | sed -n 's/^ *Candidate: *//p' | grep -v none || true
-}
-
-codename() {
-    # shellcheck source=/dev/null
-    . "${OS_RELEASE:-/etc/os-release}" && echo "${VERSION_CODENAME:-}"
-}
-
-as_root() {
-    if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi
-}
-
-refuse() {
-    printf '%s\n' "$*" >&2
-    exit 1
-}
-
-add_backports() {
-    echo "Adding Debian's backports in $backports_list, for the Vulkan driver alone ..."
-    echo "deb [signed-by=$debian_keys] http://deb.debian.org/debian bookworm-backports main" | as_root tee "$backports_list" >/dev/null
+provide_driver() { # make apt know a Vulkan driver that SAPIEN accepts, and set `release` to where it is
+    local offered
+    offered=$(offered_version mesa-vulkan-drivers)
+    suffices mesa-vulkan-drivers "$offered" && return
+    grep -qs '^VERSION_CODENAME=bookworm' "$os_release" || refuse "SAPIEN draws with mesa-vulkan-drivers $oldest_driver \
+or newer, and this system offers ${offered:-none}. Use Debian 12 or newer, or Ubuntu 24.04 or newer, or install a newer \
+Mesa. Training needs none."
+    echo "Adding Debian's backports in $backports_list, for the Vulkan driver ..."
+    echo "deb [signed-by=$debian_keys] http://deb.debian.org/debian bookworm-backports main" |
+        as_root tee "$backports_list" >/dev/null
     as_root apt-get update -qq
-}
-
-provide_driver() { # make apt know a Vulkan driver that SAPIEN accepts
-    is_new_enough mesa-vulkan-drivers "$(candidate mesa-vulkan-drivers)" && return
-    [ "$(codename)" = bookworm ] || refuse "This system has mesa-vulkan-drivers $(candidate mesa-vulkan-drivers), \
-and SAPIEN accepts $oldest_driver or newer. Use Debian 12 or newer, or Ubuntu 24.04 or newer, or a newer Mesa of your own. \
-Training on ManiSkill needs none."
-    add_backports
     release=(-t bookworm-backports)
 }
 
@@ -59,19 +53,20 @@ if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
 Vulkan driver lavapipe ($oldest_driver or newer), with this system's own package manager."
 fi
 
+purposes=("$@")
+[ $# -gt 0 ] || purposes=(opengl vulkan)
 wanted=()
-for purpose in "${@:-opengl vulkan}"; do
+for purpose in "${purposes[@]}"; do
     case "$purpose" in
     opengl) wanted+=("${opengl_packages[@]}") ;;
     vulkan) wanted+=("${vulkan_packages[@]}") ;;
-    "opengl vulkan") wanted+=("${opengl_packages[@]}" "${vulkan_packages[@]}") ;;
     *) refuse "there is nothing to install for '$purpose'. Known: opengl, vulkan." ;;
     esac
 done
 
 missing=()
 for package in "${wanted[@]}"; do
-    is_new_enough "$package" "$(installed_version "$package")" || missing+=("$package")
+    suffices "$package" "$(installed_version "$package")" || missing+=("$package")
 done
 if [ ${#missing[@]} -eq 0 ]; then
     echo "Nothing to install: ${wanted[*]} are there."
@@ -81,7 +76,7 @@ if [ "$(id -u)" -ne 0 ] && ! command -v sudo >/dev/null; then
     refuse "Missing: ${missing[*]}. This needs root, and there is no sudo; as root: scripts/install_system_packages.sh"
 fi
 
-echo "Installing ${missing[*]} (drawing without a display) with apt-get ..."
+echo "Installing ${missing[*]} (to draw without a display) with apt-get ..."
 release=()
 as_root apt-get update -qq
 [[ " ${missing[*]} " != *" mesa-vulkan-drivers "* ]] || provide_driver

@@ -11,7 +11,7 @@ draws() {
 draws && exit
 if [ "$(id -u)" -eq 0 ]; then
     echo "Installing software OpenGL, for the videos ..."
-    scripts/install_system_packages.sh || echo "The system packages could not be installed; the reason is above." >&2
+    scripts/install_system_packages.sh opengl || echo "The system packages could not be installed; the reason is above." >&2
     draws && exit
 fi
 .venv/bin/python -c '

@@ -1,4 +1,4 @@
-"""Pictures without a display, and the installer of the libraries that they need."""
+"""Pictures without a display."""
 
 import ctypes
 import os
@@ -14,7 +14,6 @@ from hcpg import registry
 from hcpg.suites import metaworld as suite
 
 ROOT = Path(__file__).parents[2]
-INSTALLER = ROOT / "scripts/install_system_packages.sh"
 DRAWER = registry.task("metaworld/drawer-open")
 
 
@@ -98,39 +97,3 @@ def test_the_users_own_choice_of_library_is_kept_and_checked_first(monkeypatch):
     with pytest.raises(suite.RenderingError, match="MUJOCO_GL=osmesa"):
         suite.SUITE.make(DRAWER, seed=0)
     assert os.environ["MUJOCO_GL"] == "osmesa"
-
-
-def install(folder, installed, *, root):
-    """Run the installer with stand-ins for what it calls; gives the process and the calls of apt-get."""
-    answers = {
-        "dpkg-query": f'case " {installed} " in *" $3 "*) echo installed;; *) exit 1;; esac',
-        "apt-get": f'echo "$*" >>{folder}/calls',
-        "id": f"echo {0 if root else 1000}",
-        "env": 'shift; exec "$@"',
-    }
-    for name, body in answers.items():
-        (folder / name).write_text(f"#!/bin/bash\n{body}\n")
-        (folder / name).chmod(0o755)
-    told = subprocess.run(
-        ["/bin/bash", INSTALLER], env={"PATH": str(folder)}, capture_output=True, text=True, check=False
-    )
-    calls = folder / "calls"
-    return told, calls.read_text().splitlines() if calls.exists() else []
-
-
-def test_the_installer_installs_what_is_missing_and_then_nothing(tmp_path):
-    told, calls = install(tmp_path, "libegl1", root=True)
-    assert told.returncode == 0
-    assert calls == ["update -qq", "install -y -qq --no-install-recommends libgl1-mesa-dri"]
-    assert "Installing libgl1-mesa-dri" in told.stdout
-    told, again = install(tmp_path, suite.OPENGL_PACKAGES, root=True)
-    assert told.returncode == 0
-    assert "Nothing to install" in told.stdout
-    assert again == calls
-
-
-def test_the_installer_says_what_it_cannot_do_without_root(tmp_path):
-    told, calls = install(tmp_path, "", root=False)
-    assert told.returncode == 1
-    assert "as root: apt-get install libegl1 libgl1-mesa-dri" in told.stderr
-    assert calls == []
