@@ -59,7 +59,7 @@ def _press(moment: Moment) -> tuple[Vector, tuple[float, ...]]:
 def _close(moment: Moment) -> tuple[Vector, tuple[float, ...]]:
     """In front of the handle first, then through where it shall be."""
     away = moment.object - moment.tool
-    in_front = np.abs(away[1:]).max() < 0.012
+    in_front = np.abs(away[1:]).max() < (0.030 if away[0] < 0.020 else 0.012)
     ahead = moment.goal[0] + 0.010 if in_front else moment.object[0] - 0.035
     return GAIN * np.array([ahead - moment.tool[0], away[1], away[2]]), ()
 

@@ -23,6 +23,9 @@ TICKS = {"peg-insertion": 3, "button-press": 1, "drawer-closing": 1, "rugby-gras
 """How many ticks in a row the condition has to hold: a peg that bounces is not inserted, and a ball is held
 for one second."""
 
+WITH_THE_TIP = ("peg-insertion", "button-press")
+"""Tasks done with the tip of the tool; in the others it is the TCP that has to be at the thing."""
+
 
 class Truth(NamedTuple):
     """One moment of a scene."""
@@ -32,6 +35,8 @@ class Truth(NamedTuple):
     goal: Float[np.ndarray, " 3"]
     tip: Float[np.ndarray, " 3"]
     """Lower end of the peg, or of the fingers."""
+    reach_m: float
+    """From the tool to the thing: 0 once it is worked on."""
     progress: float
     """Part of the task that is done, 0 to 1."""
     holds: bool
@@ -50,18 +55,20 @@ class Judge:
         self.restart()
 
     def restart(self) -> None:
-        """Begin an episode with things as they lie now."""
+        """Begin an episode with things as they lie now; `first` is where the thing lies."""
         self._held_for = 0
-        self._first = self._data.site_xpos[self._at.object].copy()
-        self._first_opening_m = self._joint("drawer") if self._task == "drawer-closing" else 0.0
+        self.first = self._data.site_xpos[self._at.object].copy()
+        self._opening_m = self._joint("drawer") if self._task == "drawer-closing" else 0.0
 
     def look(self) -> Truth:
         """What is true now, without counting a tick."""
         data = self._data
         thing, tip = data.site_xpos[self._at.object].copy(), data.site_xpos[self._at.tip].copy()
         progress, holds = self._measure(self, thing, tip)
+        tool = tip if self._task in WITH_THE_TIP else data.site_xpos[self._at.tcp]
+        reach_m = 0.0 if progress > 0 else float(np.linalg.norm(thing - tool))
         done = self._held_for >= TICKS[self._task]
-        return Truth(thing, self._goal(), tip, progress, holds, done)
+        return Truth(thing, self._goal(), tip, reach_m, progress, holds, done)
 
     def tick(self) -> Truth:
         """What is true now, one tick after the last."""
@@ -71,7 +78,7 @@ class Judge:
 
     def _goal(self) -> Float[np.ndarray, " 3"]:
         if self._task == "rugby-grasp":
-            return self._first + np.array([0.0, 0.0, LIFT_GOAL_M])
+            return self.first + np.array([0.0, 0.0, LIFT_GOAL_M])
         return self._data.site("goal").xpos.copy()
 
     def _joint(self, name: str) -> float:
@@ -87,10 +94,10 @@ class Judge:
 
     def _drawer(self, _: Float[np.ndarray, " 3"], __: Float[np.ndarray, " 3"]) -> tuple[float, bool]:
         opening = self._joint("drawer")
-        return _share(1.0 - opening / max(self._first_opening_m, 1e-6)), opening < DRAWER_OPENING_M
+        return _share(1.0 - opening / max(self._opening_m, 1e-6)), opening < DRAWER_OPENING_M
 
     def _ball(self, ball: Float[np.ndarray, " 3"], _: Float[np.ndarray, " 3"]) -> tuple[float, bool]:
-        gripped, lift = self._gripped(), float(ball[2] - self._first[2])
+        gripped, lift = self._gripped(), float(ball[2] - self.first[2])
         return gripped * (0.3 + 0.7 * _share(lift / BALL_LIFT_M)), gripped and lift >= BALL_LIFT_M
 
     def _gripped(self) -> bool:

@@ -43,6 +43,11 @@ class Physics:
         self._impedance.relax()
         self.target = self.position
 
+    def arrange(self, layout: Layout) -> None:
+        """Put the things where the layout says and leave the arm as it is."""
+        arrange(self.model, self.data, layout)
+        self._mujoco.mj_forward(self.model, self.data)
+
     def step(self) -> None:
         """One time step: forces from where everything is now, then motion."""
         data, at = self.data, self.at
@@ -63,6 +68,18 @@ class Physics:
     def velocity(self) -> Float[np.ndarray, " 3"]:
         """Of the TCP, m/s."""
         return self._read_jacobian()[:3] @ self.data.qvel[self.at.arm_speeds]
+
+    @property
+    def quaternion(self) -> Float[np.ndarray, " 4"]:
+        """Of the hand, scalar last."""
+        scalar_first = np.zeros(4)
+        self._mujoco.mju_mat2Quat(scalar_first, self.data.site_xmat[self.at.tcp])
+        return np.roll(scalar_first, -1)
+
+    @property
+    def joint_angles(self) -> Float[np.ndarray, " 7"]:
+        """Of the arm, rad."""
+        return self.data.qpos[self.at.arm].copy()
 
     @property
     def width_m(self) -> float:

@@ -11,7 +11,24 @@ from hcpg.types import Float
 
 ASSETS = Path(__file__).parent / "assets"
 PEG_WIDTH_M = 0.020
+SURVEY_M = 0.0003
+"""Standard deviation, along each axis, of a position that was touched off with the TCP."""
 Point = tuple[float, float, float]
+
+
+class Camera(NamedTuple):
+    """How poorly a moving thing is seen; the fields of `perception.truth.Poorness`."""
+
+    rate_hz: float = 10.0
+    delay_s: float = 0.1
+    noise_m: Point = (0.0001, 0.0001, 0.001)
+    """Of a 40 mm tag from 0.6 m with refined corners."""
+    dropouts: float = 0.02
+    age_limit_s: float = 0.4
+
+
+BALL_CAMERA = Camera(noise_m=(0.002, 0.002, 0.002), dropouts=0.05)
+"""A ball carries no tag: the middle of a coloured patch in a depth picture."""
 
 
 class Scene(NamedTuple):
@@ -27,8 +44,11 @@ class Scene(NamedTuple):
     """Nominal position of the body that a person would put there."""
     spread: Point
     """The fixture is laid out uniformly within this distance of its nominal position, along each axis."""
-    object: str
-    """What perception calls the thing."""
+    fixed: str = ""
+    """What was touched off before the episode and does not move (or where the drawer will be when closed)."""
+    moving: str = ""
+    """What a camera follows."""
+    camera: Camera = Camera()
     finger_target_m: tuple[float, float] = (0.0, 0.04)
     """Of one finger, for a closed and for an open hand."""
     yaw_rad: float = 0.0
@@ -45,7 +65,7 @@ SCENES = {
         home_grip="close",
         fixture=(0.45, 0.0, 0.0),
         spread=(0.04, 0.05, 0.0),
-        object="hole",
+        fixed="hole",
         finger_target_m=(PEG_WIDTH_M / 2, PEG_WIDTH_M / 2),
     ),
     "button-press": Scene(
@@ -55,7 +75,7 @@ SCENES = {
         home_grip="close",
         fixture=(0.45, 0.0, 0.0),
         spread=(0.06, 0.06, 0.0),
-        object="button",
+        fixed="button",
     ),
     "drawer-closing": Scene(
         file="drawer_closing.xml",
@@ -64,7 +84,8 @@ SCENES = {
         home_grip="close",
         fixture=(0.62, 0.0, 0.0),
         spread=(0.02, 0.04, 0.0),
-        object="drawer",
+        fixed="cabinet",
+        moving="drawer",
         opening_m=(0.10, 0.15),
     ),
     "rugby-grasp": Scene(
@@ -74,7 +95,8 @@ SCENES = {
         home_grip="open",
         fixture=(0.45, 0.0, 0.032),
         spread=(0.06, 0.08, 0.0),
-        object="ball",
+        moving="ball",
+        camera=BALL_CAMERA,
         yaw_rad=0.17,
     ),
 }
@@ -89,6 +111,8 @@ class Layout(NamedTuple):
     opening_m: float
     start: Float[np.ndarray, " 3"]
     """TCP, m."""
+    survey: Float[np.ndarray, " 3"]
+    """Error of the touched-off position, m."""
 
 
 START_SPREAD_M = 0.02
@@ -113,7 +137,7 @@ def layout(of: Scene, seed: int, start: int) -> Layout:
     yaw_rad = of.yaw_rad * random.uniform(-1, 1)
     opening_m = random.uniform(*of.opening_m)
     begin = np.array(of.home) + START_SPREAD_M * random.uniform(-1, 1, 3)
-    return Layout(fixture, yaw_rad, opening_m, begin)
+    return Layout(fixture, yaw_rad, opening_m, begin, SURVEY_M * random.normal(size=3))
 
 
 def build(of: Scene, timestep_s: float) -> Any:
