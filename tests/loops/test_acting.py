@@ -40,6 +40,17 @@ def test_candidates_are_never_mixed_between_environments(rule):
     np.testing.assert_allclose(actions, expected, atol=1e-6)
 
 
+def test_watching_a_selector_changes_nothing():
+    """The policy that tells everything acts bit for bit like the one that trains."""
+    watched = jax.jit(acting.considered(Follower(1.0), Selector("hcpg", candidates=4), read_scene))
+    found = watched(state(), OBSERVATIONS, KEY, LUCK)
+    np.testing.assert_array_equal(found.actions, chosen("hcpg", noise=1.0).actions)
+    assert found.proposals.shape == (ENVIRONMENTS, 4, 4)
+    assert found.scene.goal.tolist() == [[2.0, 0.0, 0.0]] * ENVIRONMENTS
+    blended = np.einsum("ek,eka->ea", found.diagnostics.weights, found.proposals)
+    np.testing.assert_allclose(found.actions, np.clip(blended, -1, 1), atol=1e-6)
+
+
 def test_every_environment_has_noise_of_its_own():
     actions = chosen("first", jnp.zeros((ENVIRONMENTS, 3)), noise=1.0).actions
     assert len({float(each) for each in actions[:, 0]}) == ENVIRONMENTS

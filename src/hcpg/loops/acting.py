@@ -10,6 +10,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from hcpg.interfaces import Method, ReadScene, Valued
 from hcpg.loops.runs_axis import axes_of, over_runs
 from hcpg.selection import Diagnostics, Selector, select
+from hcpg.types import Scene
 
 
 class Chosen(NamedTuple):
@@ -19,28 +20,50 @@ class Chosen(NamedTuple):
     seen: dict[str, Float[Array, "*runs"]]
 
 
+class Considered(NamedTuple):
+    """What to execute, and everything the selector knew and did, per environment."""
+
+    actions: Float[Array, "*runs E A"]
+    proposals: Float[Array, "*runs E K A"]
+    scene: Scene
+    diagnostics: Diagnostics
+
+
 def guided(method: Method, selector: Selector, read_scene: ReadScene) -> Callable[..., Chosen]:
     """A policy of the proposals: (state, observations [E, O], actor key, selector key) -> Chosen [E].
 
     Source: paper, algorithm 1, lines 1 to 7.
     """
+    consider = considered(method, selector, read_scene)
+
+    def every(state: Any, observations: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> Chosen:
+        found = consider(state, observations, key, luck)
+        return Chosen(found.actions, _summary(found.diagnostics))
+
+    return every
+
+
+def considered(method: Method, selector: Selector, read_scene: ReadScene) -> Callable[..., Considered]:
+    """The same policy, for those who want to see it think: it acts bit for bit like `guided`.
+
+    Raises:
+        TypeError: the selector ranks by value, and the method has no `value`.
+    """
     if selector.needs_values and not isinstance(method, Valued):
         raise TypeError(f"the selector {selector.rule!r} needs a method with `value`, got {method!r}")
 
-    def one(state: Any, observation: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> tuple:
+    def one(state: Any, observation: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> Considered:
         proposals = method.propose(state, observation, key, selector.candidates)
         extra = {}
         if selector.needs_noise:
             extra["noise"] = jax.random.uniform(luck, (selector.candidates,))
         if selector.needs_values:
             extra["values"] = cast("Valued", method).value(state, observation, proposals)
-        return select(proposals, read_scene(observation), selector, **extra)
+        scene = read_scene(observation)
+        action, diagnostics = select(proposals, scene, selector, **extra)
+        return Considered(action, proposals, scene, diagnostics)
 
-    def every(state: Any, observations: Array, key: PRNGKeyArray, luck: PRNGKeyArray) -> Chosen:
-        actions, diagnostics = _per_environment(one)(state, observations, key, luck)
-        return Chosen(actions, _summary(diagnostics))
-
-    return every
+    return _per_environment(one)
 
 
 def bare(method: Method) -> Callable[..., Chosen]:
@@ -55,13 +78,13 @@ def bare(method: Method) -> Callable[..., Chosen]:
     return every
 
 
-def compiled(policy: Callable[..., Chosen], state_type: type, runs: int) -> Callable[..., Chosen]:
+def compiled(policy: Callable[..., Any], state_type: type, runs: int) -> Callable[..., Any]:
     """The policy for R runs: (states, observations [R, E, O], actor keys [R], selector keys [R], tick).
 
     `tick` counts the policy's calls; it names the random numbers of this one.
     """
 
-    def one_run(state: Any, observations: Array, key: Array, luck: Array, tick: Array) -> Chosen:
+    def one_run(state: Any, observations: Array, key: Array, luck: Array, tick: Array) -> Any:
         return policy(state, observations, jax.random.fold_in(key, tick), jax.random.fold_in(luck, tick))
 
     return jax.jit(over_runs(one_run, runs, (axes_of(state_type), 0, 0, 0, None)))

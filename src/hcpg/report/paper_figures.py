@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from hcpg.report import ablation_figures, bars, figures, progress
+from hcpg.report import ablation_figures, bars, figures, progress, strips
 from hcpg.report.ablation import ablated, candidate_table
 from hcpg.report.pictures import save
 from hcpg.report.provenance import provenance
@@ -24,7 +24,24 @@ def write_figures(groups: Sequence[Group], folder: Path, command: str) -> list[P
         caption = bars.CAPTION.format(suite=suite)
         written += save(bars.success_bars(own), folder / f"bars_{suite}", caption, provenance(own, command))
     written += save(progress.progress_figure(groups), folder / "progress", progress.CAPTION, origin)
+    written += _strips(groups, folder, command)
     return written + _ablation(ablated(groups), folder, command)
+
+
+def _strips(groups: Sequence[Group], folder: Path, command: str) -> list[Path]:
+    """A row per task of which a run has a strip, ours before others; none without any."""
+    chosen: dict[str, tuple[Group, strips.Strip]] = {}
+    for group in sorted(groups, key=lambda group: group.preset != strips.FIRST):
+        found = strips.find_strips(run.path for run in group.runs)
+        if found and group.task not in chosen:
+            chosen[group.task] = (group, strips.read_strip(found[0]))
+    if not chosen:
+        return []
+    pairs = [chosen[task] for task in sorted(chosen)]
+    episodes = "; ".join(strip.title for _, strip in pairs)
+    figure = strips.rollout_strips([strip for _, strip in pairs])
+    origin = provenance([group for group, _ in pairs], command)
+    return save(figure, folder / "rollouts", strips.CAPTION.format(episodes=episodes), origin)
 
 
 def _ablation(groups: Sequence[Group], folder: Path, command: str) -> list[Path]:
