@@ -18,6 +18,7 @@ COMMANDS = {
     "experiment": "make the runs of a table on all cores, or show how far they are",
     "play": "make a video of a trained run",
     "report": "write the table and the learning curves of all runs in a folder",
+    "robot": "look at an arm or its twin, run episodes on it at 30 Hz, inject faults",
     "list": "show the methods, selectors, tasks, presets and budgets",
     "doctor": "look at this machine: what works, what is missing, and the cure",
 }

@@ -16,12 +16,12 @@ from hcpg.loops.control.sessions import Purpose, Session, SessionResult
 from hcpg.loops.control.step_log import Sink, StepLog
 from hcpg.loops.control.stopping import StopButton
 from hcpg.loops.control.workers import worker_for
-from hcpg.robot_types import Sight, Snapshot
+from hcpg.robot_types import Kind, Sight, Snapshot
 from hcpg.safety.faults import FaultyRobot
 from hcpg.selection import Selector
 from hcpg.types import Float
 
-EPISODES, HORIZON, CANDIDATES = 3, 60, 4
+EPISODES, HORIZON, CANDIDATES = 2, 60, 4
 FIRST_TICK = 15
 """The fault begins at this tick of the first episode: half a second into it."""
 
@@ -124,10 +124,20 @@ class Fault(NamedTuple):
 class Outcome(NamedTuple):
     """What became of one fault."""
 
-    fault: Fault
-    session: SessionResult
+    what: str
+    endings: tuple[str, ...]
+    """Of the episodes: `success`, `time_limit`, `fault` or `stopped`."""
+    cause: str
+    """Why the first episode ended."""
+    session_ended: str
+    """Why the session ended early; "" if it went on to its end."""
+    steps_to_success: tuple[int, ...]
     hold_after_ms: float
     """From the fault to the first tick without a command; NaN if the episode went on to its end."""
+    held: int
+    """Ticks without a command, of all episodes."""
+    skipped: int
+    """Deadlines missed, of all episodes."""
     moved_while_held_mm: float
     """The furthest that the arm was from where a hold began."""
     furthest_outside_mm: float
@@ -139,18 +149,28 @@ class Outcome(NamedTuple):
     ticks: int
     logged: int
     """Steps in the log; each tick has to be there."""
+    cost_s: float
+    """From the fault to the beginning of the next episode; NaN if there was none."""
 
 
-def drill(rig: Rig, task: RobotTask, read_scene: ReadScene, fault: Fault, folder: Path) -> Outcome:
-    """Inject `fault` into the first of three episodes of random proposals with the selector.
+def drill(
+    rig: Rig, kind: Kind, task: RobotTask, read_scene: ReadScene, fault: Fault, folder: Path
+) -> Outcome:
+    """Inject `fault` into the first of two episodes of random proposals with the selector.
 
     The log is written into `folder`.
+
+    Raises:
+        DrillError: the robot is a real one.
     """
+    if kind == "real":
+        raise DrillError("faults are injected on twins only; a real arm has enough of its own")
     site = Site(rig, fault)
     chooser = Chooser(partial(site.propose, task.action_size), _SELECTOR, read_scene, task.action_size, 0)
-    log = StepLog(folder / "steps.jsonl", site.open_disk, threaded=False)
     clock = site.robot.clock
-    crew = Crew.of(Rig(site.robot, site, rig.stage), task, chooser, worker_for(clock, "policy"), log)
+    log = StepLog(folder / "steps.jsonl", site.open_disk, threaded=False)
+    parts = Rig(site.robot, site, rig.stage)
+    crew = Crew.of(parts, task, chooser, worker_for(clock, "policy"), log)
     site.button = crew.button
     session = Session(crew, worker_for(clock, "robot calls"), HORIZON)
     return _outcome(fault, site, session.run(range(EPISODES), fault.purpose, site), log.path)
@@ -160,23 +180,32 @@ _SELECTOR = Selector(candidates=CANDIDATES)
 
 
 def _outcome(fault: Fault, site: Site, session: SessionResult, log: Path) -> Outcome:
-    rows = [json.loads(line) for line in log.read_text().splitlines()]
-    steps = {(row["episode"], row["tick"]["number"]) for row in rows if row["kind"] == "step"}
-    first = session.episodes[0]
+    episodes, first, seen = session.episodes, session.episodes[0], site.robot.seen
     begin_s = first.records[FIRST_TICK].tick.due_s
     last = len(first.records) - (first.ended in ("success", "time_limit"))
     held = [record for record in first.records[FIRST_TICK:last] if record.executed is None]
     return Outcome(
-        fault=fault,
-        session=session,
+        what=fault.what,
+        endings=tuple(each.ended for each in episodes),
+        cause=first.verdict.cause,
+        session_ended=session.ended,
+        steps_to_success=tuple(each.steps_to_success for each in episodes),
         hold_after_ms=1000 * (held[0].tick.woke_s - begin_s) if held else float("nan"),
+        held=sum(each.held for each in episodes),
+        skipped=sum(each.timing.skipped for each in episodes),
         moved_while_held_mm=_moved_while_held_mm(site, session),
-        furthest_outside_mm=1000 * site.robot.seen.furthest_outside_m,
-        applied_while_wrong=site.robot.seen.applied_while_wrong,
-        refused=site.robot.seen.refused,
-        ticks=sum(len(each.records) for each in session.episodes),
-        logged=len(steps),
+        furthest_outside_mm=1000 * seen.furthest_outside_m,
+        applied_while_wrong=seen.applied_while_wrong,
+        refused=dict(seen.refused),
+        ticks=sum(len(each.records) for each in episodes),
+        logged=len(_logged_ticks(log)),
+        cost_s=episodes[1].records[0].tick.woke_s - begin_s if len(episodes) > 1 else float("nan"),
     )
+
+
+def _logged_ticks(log: Path) -> set[tuple[int, int]]:
+    rows = [json.loads(line) for line in log.read_text().splitlines()]
+    return {(row["episode"], row["tick"]["number"]) for row in rows if row["kind"] == "step"}
 
 
 def _moved_while_held_mm(site: Site, session: SessionResult) -> float:

@@ -1,12 +1,16 @@
 """Episode after episode on one robot; however it ends, the robot is stopped and let go."""
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
+from hcpg.interfaces import Rig, RobotTask
+from hcpg.loops.control.choosing import Chooser
 from hcpg.loops.control.episodes import Crew, Episode
 from hcpg.loops.control.mending import Mender, Patience
 from hcpg.loops.control.records import EpisodeResult
-from hcpg.loops.control.workers import Worker
+from hcpg.loops.control.step_log import StepLog
+from hcpg.loops.control.workers import Worker, passes_by_itself, worker_for
 
 Purpose = Literal["train", "evaluate"]
 
@@ -30,6 +34,8 @@ class SessionResult(NamedTuple):
     episodes: tuple[EpisodeResult, ...]
     ended: str
     """"" if every start state was run, else the reason."""
+    signal: int | None = None
+    """The signal that stopped it, if one did."""
 
 
 class Session:
@@ -40,6 +46,18 @@ class Session:
         self._crew, self._calls, self._horizon = crew, calls, horizon
         self._mender = Mender(crew, calls, patience or Patience())
         self._told = False
+
+    @classmethod
+    def of(cls, rig: Rig, task: RobotTask, chooser: Chooser, log: Path, horizon: int) -> "Session":
+        """A session with the workers that the robot's clock calls for; steps go to the file `log`.
+
+        Raises:
+            LogError: there is no room for the log.
+        """
+        clock = rig.robot.clock
+        steps = StepLog(log, threaded=passes_by_itself(clock))
+        crew = Crew.of(rig, task, chooser, worker_for(clock, "policy"), steps)
+        return cls(crew, worker_for(clock, "robot calls"), horizon)
 
     def run(
         self, starts: Iterable[int], purpose: Purpose = "evaluate", learner: Learner | None = None
@@ -64,7 +82,7 @@ class Session:
                     ended = self._settled(results[-1])
         finally:
             self._let_go()
-        return SessionResult(tuple(results), ended)
+        return SessionResult(tuple(results), ended, self._crew.button.signal)
 
     def _prepared(self, start: int) -> str:
         self._crew.rig.stage.arrange(start)

@@ -113,7 +113,7 @@ class StepLog:
             try:
                 taken = self._sink.write(self._unsent)
             except OSError as error:
-                self.failure = self.failure or f"cannot write {self.path}: {error.strerror}"
+                self.failure = self.failure or f"cannot write {self.path.name}: {error.strerror}"
                 self._full = error.errno in (errno.ENOSPC, errno.EDQUOT)
                 return False
             self._unsent = self._unsent[taken or 0 :]

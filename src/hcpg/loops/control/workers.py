@@ -110,6 +110,11 @@ class ThreadWorker:
                 self._changed.notify_all()
 
 
+def passes_by_itself(clock: Clock) -> bool:
+    """Whether time goes on while somebody computes; a simulation's stands still meanwhile."""
+    return isinstance(clock, MachineClock)
+
+
 def worker_for(clock: Clock, name: str) -> Worker:
-    """A thread where time passes by itself; where it stands still meanwhile, the caller's own thread."""
-    return ThreadWorker(clock, name) if isinstance(clock, MachineClock) else InlineWorker(clock)
+    """A thread where time passes by itself; else the caller's own thread."""
+    return ThreadWorker(clock, name) if passes_by_itself(clock) else InlineWorker(clock)

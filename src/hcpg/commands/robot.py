@@ -1,0 +1,157 @@
+"""`hcpg robot`: look at an arm, run episodes on it, or inject faults into a twin."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+from hcpg import registry
+from hcpg.interfaces import Rig
+from hcpg.loops.control import drill_table
+from hcpg.loops.control.choosing import Chooser
+from hcpg.loops.control.drill import Outcome, drill
+from hcpg.loops.control.drill_list import FAULTS
+from hcpg.loops.control.proposing import uniform
+from hcpg.loops.control.records import EpisodeResult
+from hcpg.loops.control.sessions import Session
+from hcpg.loops.control.step_log import plain
+from hcpg.loops.control.watching import Watched, watch
+from hcpg.registry import UnknownNameError
+from hcpg.robot_types import Limits
+from hcpg.selection import RULES, Selector
+
+STEPS = "steps.jsonl"
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Carry out `check`, `run` or `drill`; gives the exit code."""
+    options = _parser().parse_args(arguments)
+    return options.carry_out(options)
+
+
+def _check(options: argparse.Namespace) -> int:
+    """0 where the robot is ready."""
+    rig = _announced(options)
+    seen = watch(rig.robot, options.seconds)
+    sys.stdout.writelines(f"{line}\n" for line in _watched_lines(seen, options.seconds))
+    if options.out is not None:
+        options.out.write_text(json.dumps(plain(seen), indent=2) + "\n")
+    return int(not seen.sound)
+
+
+def _run(options: argparse.Namespace) -> int:
+    """0 where every episode was run, 128 + the signal where one stopped it, else 1."""
+    rig, task = _announced(options), registry.robot_task(options.task)
+    address = registry.task(options.task)
+    selector = Selector(rule=options.selector, candidates=options.candidates)
+    propose = partial(uniform, options.seed, task.action_size)
+    chooser = Chooser(propose, selector, address.adapters[options.adapter], task.action_size, options.seed)
+    options.out.mkdir(parents=True, exist_ok=True)
+    session = Session.of(rig, task, chooser, options.out / STEPS, options.horizon or address.horizon)
+    done = session.run(range(options.start, options.start + options.episodes))
+    kind = registry.robot(options.robot).kind
+    sys.stdout.writelines(f"{kind}: {_episode_line(each)}\n" for each in done.episodes)
+    sys.stdout.write(f"ended early: {done.ended}\n" if done.ended else "")
+    sys.stdout.write(f"every step in {options.out / STEPS}\n")
+    return int(bool(done.ended)) if done.signal is None else 128 + done.signal
+
+
+def _drill(options: argparse.Namespace) -> int:
+    """0 where every fault was harmless."""
+    names = options.fault or list(FAULTS)
+    for name in names:
+        if name not in FAULTS:
+            raise UnknownNameError("fault", name, list(FAULTS))
+    outcomes = {}
+    for name in names:
+        outcomes[name] = _drilled(options, name)
+        sys.stdout.write(f"{drill_table.line(name, outcomes[name])}\n")
+    kind = registry.robot(options.robot).kind
+    (options.out / "outcomes.json").write_text(json.dumps(plain(outcomes), indent=2) + "\n")
+    (options.out / "table.md").write_text(drill_table.table(options.robot, kind, outcomes))
+    return int(not all(map(drill_table.harmless, outcomes.values())))
+
+
+def _drilled(options: argparse.Namespace, name: str) -> Outcome:
+    folder = options.out / name
+    folder.mkdir(parents=True, exist_ok=False)
+    plugin = registry.robot(options.robot)
+    rig = plugin.make(options.task, options.address)
+    read_scene = registry.task(options.task).adapters["paper"]
+    return drill(rig, plugin.kind, registry.robot_task(options.task), read_scene, FAULTS[name], folder)
+
+
+def _announced(options: argparse.Namespace) -> Rig:
+    """The rig that the options name; says what it is and what it is held to."""
+    plugin = registry.robot(options.robot)
+    registry.robot_task(options.task)  # a task that no arm does is refused before any driver loads
+    rig = plugin.make(options.task, options.address)
+    sys.stdout.write(f"{options.robot} ({plugin.kind}), {options.task}; limits:\n")
+    sys.stdout.writelines(f"  {line}\n" for line in _limit_lines(rig.robot.limits))
+    return rig
+
+
+def _limit_lines(limits: Limits) -> Iterator[str]:
+    width = max(map(len, asdict(limits)))
+    return (f"{name:{width}}  {value}" for name, value in asdict(limits).items())
+
+
+def _watched_lines(seen: Watched, seconds: float) -> Iterator[str]:
+    versions = "".join(f", {name} {version}" for name, version in seen.info.versions.items())
+    yield f"connected to {seen.info.name} ({seen.info.kind}){versions}"
+    for check in seen.info.checks:
+        mark, cure = ("ok", "") if check.passed else ("FAILED", f"; {check.cure}")
+        yield f"  {mark:6}  {check.name}: {check.found}{cure}"
+    timing = seen.timing
+    yield f"held for {seconds:g} s: {timing.ticks} ticks, {timing.skipped} deadlines missed"
+    late = (timing.lateness_p50_ms, timing.lateness_p99_ms, timing.lateness_max_ms)
+    yield "lateness p50 {:.3f}, p99 {:.3f}, max {:.3f} ms".format(*late)
+    yield f"slowest tick {seen.body_max_ms:.2f} ms, oldest state {seen.state_age_max_ms:.1f} ms"
+    yield f"lowest success rate {seen.success_rate_min:.2f}, modes {', '.join(seen.modes)}"
+    yield f"moved {seen.moved_mm:.2f} mm, {seen.outside_mm:.1f} mm outside the box"
+    yield "ready" if seen.sound else "not ready: see above"
+
+
+def _episode_line(result: EpisodeResult) -> str:
+    steps = f" after {result.steps_to_success} actions" if result.ended == "success" else ""
+    timing = "" if result.timing.sound else f"; timing unsound, {result.timing.skipped} deadlines missed"
+    told = f"start {result.start}: {result.ended}{steps} ({result.verdict.cause})"
+    return f"{told}, {result.actions} actions, {result.held} held{timing}"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="hcpg robot",
+        description="An arm at 30 Hz, or its twin. Limits are on unless the robot's file says so.",
+    )
+    actions = parser.add_subparsers(required=True, metavar="check | run | drill")
+    check = _action(actions, "check", _check, "connect, check, hold still, let go")
+    check.add_argument("--seconds", type=float, default=2.0, help="how long to hold; default: 2")
+    check.add_argument("--out", type=Path, metavar="FILE", help="what was found, as JSON")
+    play = _action(actions, "run", _run, "episodes of random proposals with a selector")
+    play.add_argument("--selector", choices=RULES, default="hcpg")
+    play.add_argument("--candidates", type=int, default=4, help="proposals per action (K); default: 4")
+    play.add_argument("--adapter", default="paper", help="scene reader; default: paper")
+    play.add_argument("--start", type=int, default=0, help="the first start state; default: 0")
+    play.add_argument("--episodes", type=int, default=1)
+    play.add_argument("--horizon", type=int, help="most actions of an episode; default: the task's")
+    play.add_argument("--seed", type=int, default=0, help="of the proposals; default: 0")
+    play.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where the steps are written")
+    faults = _action(actions, "drill", _drill, "inject faults into a twin and tell what happened")
+    faults.add_argument("--fault", nargs="*", help=f"some of: {', '.join(FAULTS)}; default: all")
+    faults.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new folder")
+    return parser
+
+
+def _action(
+    actions: "argparse._SubParsersAction", name: str, carry_out: object, what: str
+) -> argparse.ArgumentParser:
+    parser = actions.add_parser(name, help=what, description=what)
+    parser.add_argument("task", metavar="TASK", help="as `hcpg list tasks` has it")
+    parser.add_argument("--robot", required=True, help=f"one of: {', '.join(registry.names('robots'))}")
+    parser.add_argument("--address", help="the controller's, where the robot has one")
+    parser.set_defaults(carry_out=carry_out)
+    return parser

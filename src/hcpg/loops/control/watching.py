@@ -1,0 +1,70 @@
+"""Look at a robot without moving it: its checks, its states, and how well this machine keeps 30 Hz."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hcpg.interfaces import Robot
+from hcpg.loops.control.deadlines import Deadlines, Timing
+from hcpg.loops.control.states import Freshness
+from hcpg.robot_types import Info, Mode
+from hcpg.safety.limiting import outside_m
+
+
+class Watched(NamedTuple):
+    """What was seen while the arm held."""
+
+    info: Info
+    timing: Timing
+    state_age_max_ms: float
+    body_max_ms: float
+    """The longest that looking and holding took."""
+    success_rate_min: float
+    modes: tuple[Mode, ...]
+    """All that occurred, in order of appearance."""
+    moved_mm: float
+    """The furthest from where it was at first."""
+    outside_mm: float
+    """Of the box, at the first look."""
+
+    @property
+    def sound(self) -> bool:
+        """Whether every check passed, the arm is inside its box and held, and deadlines were kept."""
+        passed = all(check.passed for check in self.info.checks)
+        return passed and self.outside_mm == 0.0 and set(self.modes) <= {"idle", "move"} and self.timing.sound
+
+
+def watch(robot: Robot, seconds: float, connect_s: float = 10.0) -> Watched:
+    """Connect, hold for `seconds`, and let go.
+
+    Raises:
+        RobotError: it cannot be connected; the message says the cure.
+    """
+    try:
+        info = robot.connect(connect_s)
+        return _held(robot, info, seconds)
+    finally:
+        robot.stop("the check ends")
+        robot.close()
+
+
+def _held(robot: Robot, info: Info, seconds: float) -> Watched:
+    deadlines, freshness, clock = Deadlines(robot.clock, robot.limits.rate_hz), Freshness(), robot.clock
+    first = robot.observe()
+    ages, bodies, rates, moved = [], [], [], 0.0
+    modes: dict[Mode, None] = {}
+    end_s = clock.now_s() + seconds
+    while clock.now_s() < end_s:
+        tick = deadlines.wait()
+        snapshot = robot.observe()
+        robot.hold()
+        modes[snapshot.mode] = None
+        ages.append(freshness.age_s(snapshot, tick.woke_s))
+        rates.append(snapshot.success_rate)
+        moved = max(moved, float(np.linalg.norm(snapshot.position - first.position)))
+        bodies.append(clock.now_s() - tick.woke_s)
+    outside_mm = 1000 * outside_m(first.position, robot.limits)
+    slowest, oldest = 1000 * max(bodies), 1000 * max(ages)
+    return Watched(
+        info, deadlines.timing(), oldest, slowest, min(rates), tuple(modes), 1000 * moved, outside_mm
+    )
