@@ -28,16 +28,21 @@ def write_figures(groups: Sequence[Group], folder: Path, command: str) -> list[P
     return written + _ablation(ablated(groups), folder, command)
 
 
-def _strips(groups: Sequence[Group], folder: Path, command: str) -> list[Path]:
-    """A row per task of which a run has a strip, ours before others; none without any."""
+def strips_of(groups: Sequence[Group]) -> list[tuple[Group, strips.Strip]]:
+    """A strip per task of which a run has one, ours before others, each with the runs it is from."""
     chosen: dict[str, tuple[Group, strips.Strip]] = {}
     for group in sorted(groups, key=lambda group: group.preset != strips.FIRST):
         found = strips.find_strips(run.path for run in group.runs)
         if found and group.task not in chosen:
             chosen[group.task] = (group, strips.read_strip(found[0]))
-    if not chosen:
+    return [chosen[task] for task in sorted(chosen)]
+
+
+def _strips(groups: Sequence[Group], folder: Path, command: str) -> list[Path]:
+    """The picture of the rollouts; none without a strip."""
+    pairs = strips_of(groups)
+    if not pairs:
         return []
-    pairs = [chosen[task] for task in sorted(chosen)]
     episodes = "; ".join(strip.title for _, strip in pairs)
     figure = strips.rollout_strips([strip for _, strip in pairs])
     origin = provenance([group for group, _ in pairs], command)
