@@ -1,11 +1,14 @@
 #!/usr/bin/env bash
-# Installs the system libraries that draw pictures and videos without a display and without a GPU, by Mesa:
-#   opengl  what MuJoCo draws with (Meta-World)      vulkan  what SAPIEN draws with (ManiSkill), Mesa 24 or newer
-# Without arguments it installs both. Training needs neither. Debian and Ubuntu; works as root, or through sudo,
-# and does nothing where they are all there. Debian 12 has a new enough Vulkan driver in its backports alone,
-# so there the script adds Debian's backports, from which apt takes nothing that it is not asked for by name.
+# Installs system libraries that the simulators load, for each purpose that is named, or for all:
+#   sapien  without which ManiSkill and its simulator SAPIEN cannot be imported (Meta-World needs none)
+#   opengl  with which MuJoCo (Meta-World) draws without a display and without a GPU, by Mesa
+#   vulkan  with which SAPIEN (ManiSkill) does, by Mesa 24 or newer
+# Debian and Ubuntu; works as root, or through sudo, and does nothing where they are all there. Debian 12 has a
+# new enough Vulkan driver in its backports alone, so there the script adds Debian's backports, from which apt
+# takes nothing but what it is asked for, and what that needs.
 set -euo pipefail
 
+readonly sapien_packages=(libx11-6 libgl1 libglib2.0-0)
 readonly opengl_packages=(libegl1 libgl1-mesa-dri)
 readonly vulkan_packages=(libvulkan1 mesa-vulkan-drivers) oldest_driver=24
 readonly backports_list=${APT_SOURCES:-/etc/apt/sources.list.d}/hcpg-flow-backports.list
@@ -21,9 +24,11 @@ as_root() {
 }
 
 installed_version() { # installed_version PACKAGE: empty where it is not installed
-    local status
-    status=$(dpkg-query -W -f='${db:Status-Status} ${Version}' "$1" 2>/dev/null) || return 0
-    [ "${status%% *}" != installed ] || echo "${status#* }"
+    local name status
+    for name in "$1" "$1t64"; do # what newer systems call libraries with a 64-bit time
+        status=$(dpkg-query -W -f='${db:Status-Status} ${Version}' "$name" 2>/dev/null) || continue
+        [ "${status%% *}" != installed ] || echo "${status#* }"
+    done
 }
 
 offered_version() { # offered_version PACKAGE: what apt would install; empty where it knows none
@@ -40,7 +45,7 @@ provide_driver() { # make apt know a Vulkan driver that SAPIEN accepts, and set 
     suffices mesa-vulkan-drivers "$offered" && return
     grep -qs '^VERSION_CODENAME=bookworm' "$os_release" || refuse "SAPIEN draws with mesa-vulkan-drivers $oldest_driver \
 or newer, and this system offers ${offered:-none}. Use Debian 12 or newer, or Ubuntu 24.04 or newer, or install a newer \
-Mesa. Training needs none."
+Mesa. Training needs none; install the rest by: scripts/install_system_packages.sh sapien opengl"
     echo "Adding Debian's backports in $backports_list, for the Vulkan driver ..."
     echo "deb [signed-by=$debian_keys] http://deb.debian.org/debian bookworm-backports main" |
         as_root tee "$backports_list" >/dev/null
@@ -54,13 +59,14 @@ Vulkan driver lavapipe ($oldest_driver or newer), with this system's own package
 fi
 
 purposes=("$@")
-[ $# -gt 0 ] || purposes=(opengl vulkan)
+[ $# -gt 0 ] || purposes=(sapien opengl vulkan)
 wanted=()
 for purpose in "${purposes[@]}"; do
     case "$purpose" in
+    sapien) wanted+=("${sapien_packages[@]}") ;;
     opengl) wanted+=("${opengl_packages[@]}") ;;
     vulkan) wanted+=("${vulkan_packages[@]}") ;;
-    *) refuse "there is nothing to install for '$purpose'. Known: opengl, vulkan." ;;
+    *) refuse "there is nothing to install for '$purpose'. Known: sapien, opengl, vulkan." ;;
     esac
 done
 
@@ -76,7 +82,7 @@ if [ "$(id -u)" -ne 0 ] && ! command -v sudo >/dev/null; then
     refuse "Missing: ${missing[*]}. This needs root, and there is no sudo; as root: scripts/install_system_packages.sh"
 fi
 
-echo "Installing ${missing[*]} (to draw without a display) with apt-get ..."
+echo "Installing ${missing[*]} with apt-get ..."
 release=()
 as_root apt-get update -qq
 [[ " ${missing[*]} " != *" mesa-vulkan-drivers "* ]] || provide_driver

@@ -24,7 +24,7 @@ def test_every_failure_has_a_cure_and_nothing_else_has():
     assert [bool(finding.cure) for finding in found] == [finding.ok is not True for finding in found]
     names = [finding.name for finding in found]
     assert names[:4] == ["python", "disk", "memory", "shared memory"]
-    assert names[-5:] == ["jax device", "jax flags", "rendering", "ffmpeg", "git"]
+    assert names[-6:] == ["jax device", "jax flags", "rendering", "vulkan", "ffmpeg", "git"]
     assert "numpy" in names
 
 
@@ -137,6 +137,59 @@ def test_rendering_is_tried_with_egl_unless_told(tmp_path):
     finding = doctor.rendering({**quiet, "MUJOCO_GL": "glfw"})
     assert finding.value == "MUJOCO_GL=glfw: ImportError: no glfw"
     assert finding.cure.endswith("; then: unset MUJOCO_GL")
+
+
+SAPIEN = """
+class render:
+    RenderSystem = lambda device: {system}
+    get_device_summary = lambda: "GPU: {name}\\n  Supported: 1\\n"
+class Device:
+    def __init__(self, name):
+        if name not in {devices}: raise RuntimeError("failed to find device " + name)
+        self.name = name
+    def is_cuda(self): return self.name == "cuda"
+"""
+
+
+@pytest.mark.parametrize(
+    ("devices", "system", "name", "ok", "value"),
+    [
+        (("cuda", "cpu"), "0", "NVIDIA H100", True, "GPU: NVIDIA H100"),
+        (("cpu",), "0", "llvmpipe (LLVM 15)", True, "processor: llvmpipe (LLVM 15)"),
+        (
+            ("cpu",),
+            "Device('none')",
+            "",
+            "warning",
+            "none: failed to find device none. ManiSkill",
+        ),
+    ],
+)
+def test_sapien_draws_on_a_gpu_on_the_processor_or_not_at_all(
+    monkeypatch, tmp_path, devices, system, name, ok, value
+):
+    shim(tmp_path, "cv2", "")
+    code = SAPIEN.format(devices=devices, system=system, name=name)
+    finding = doctor.vulkan({**os.environ, "PYTHONPATH": shim(tmp_path, "sapien", code)})
+    assert (finding.name, finding.ok) == ("vulkan", ok)
+    assert finding.value.startswith(value)
+    assert ("install_system_packages.sh vulkan" in finding.cure) == (ok == "warning")
+
+
+def test_a_library_that_sapien_misses_is_named_with_its_cure(tmp_path):
+    code = "raise ImportError('libX11.so.6: cannot open shared object file')"
+    shim(tmp_path, "cv2", "")
+    finding = doctor.vulkan({**os.environ, "PYTHONPATH": shim(tmp_path, "sapien", code)})
+    assert finding.ok == "warning"
+    assert finding.value == "ManiSkill cannot start: ImportError: libX11.so.6: cannot open shared object file"
+    assert finding.cure.endswith("sudo scripts/install_system_packages.sh sapien")
+
+
+def test_a_machine_without_vulkan_drivers_trains_without_videos():
+    pytest.importorskip("sapien")
+    finding = doctor.vulkan({**os.environ, "VK_DRIVER_FILES": "/nowhere", "VK_ICD_FILENAMES": "/nowhere"})
+    assert finding.ok == "warning"
+    assert finding.value.endswith("ManiSkill trains here all the same, without videos")
 
 
 def test_a_machine_without_ffmpeg_or_git_only_warns(monkeypatch, tmp_path):

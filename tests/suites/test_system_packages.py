@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 INSTALLER = Path(__file__).parents[2] / "scripts/install_system_packages.sh"
-OPENGL, VULKAN = "libegl1 libgl1-mesa-dri", "libvulkan1 mesa-vulkan-drivers"
+SAPIEN, OPENGL = "libx11-6 libgl1 libglib2.0-0", "libegl1 libgl1-mesa-dri"
+VULKAN = "libvulkan1 mesa-vulkan-drivers"
 BACKPORTED = "25.0.7-2~bpo12+1"
 
 
@@ -65,13 +66,20 @@ def test_what_is_missing_for_one_purpose_is_installed_and_then_nothing(machine):
 
 
 def test_debian_twelve_gets_the_vulkan_driver_from_its_backports(machine):
-    machine.installed = {"libegl1": "1.6", "libgl1-mesa-dri": "22.3.6"}
+    machine.installed = dict.fromkeys([*SAPIEN.split(), *OPENGL.split()], "22.3.6")
     told, calls = machine.run()
     assert told.returncode == 0
     install = f"install -y -qq --no-install-recommends -t bookworm-backports {VULKAN}"
     assert calls == ["update -qq", "update -qq", install]
     (source,) = machine.sources.iterdir()
     assert source.read_text().endswith(" http://deb.debian.org/debian bookworm-backports main\n")
+
+
+def test_a_package_under_its_newer_name_is_there(machine):
+    machine.installed = {"libx11-6": "2:1.8", "libgl1": "1.7", "libglib2.0-0t64": "2.80"}
+    told, calls = machine.run("sapien")
+    assert told.stdout == f"Nothing to install: {SAPIEN} are there.\n"
+    assert calls == []
 
 
 def test_a_driver_that_sapien_refuses_counts_as_missing_and_a_newer_one_as_there(machine):
@@ -104,7 +112,9 @@ def test_it_says_what_it_cannot_do_without_root(tmp_path):
     machine = Machine(tmp_path, root=False)
     told, calls = machine.run()
     assert told.returncode == 1
-    assert told.stderr.startswith(f"Missing: {OPENGL} {VULKAN}. This needs root, and there is no sudo")
+    assert told.stderr.startswith(
+        f"Missing: {SAPIEN} {OPENGL} {VULKAN}. This needs root, and there is no sudo"
+    )
     assert calls == []
 
 
@@ -120,7 +130,7 @@ def test_sudo_is_used_where_it_is_there(tmp_path):
 
 def test_an_unknown_purpose_and_another_system_are_told(machine):
     told, _ = machine.run("metal")
-    assert told.stderr == "there is nothing to install for 'metal'. Known: opengl, vulkan.\n"
+    assert told.stderr == "there is nothing to install for 'metal'. Known: sapien, opengl, vulkan.\n"
     (machine.folder / "apt-get").unlink()
     told, _ = machine.run()
     assert told.returncode == 1

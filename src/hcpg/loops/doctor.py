@@ -1,7 +1,7 @@
 """What this machine offers to HCPG-Flow: one finding per line, each failure with its cure.
 
-Nothing heavy is imported here: JAX and MuJoCo are tried in processes of their own, so that a driver that
-crashes or hangs becomes a finding.
+Nothing heavy is imported here: JAX and the simulators are tried in processes of their own, so that a driver
+that crashes or hangs becomes a finding.
 """
 
 import os
@@ -52,6 +52,24 @@ if brightest == 0:
 print("draws without a display")
 """
 
+# As ManiSkill chooses it: a GPU that computes, else the processor, through Mesa. It imports OpenCV, too.
+_VULKAN_PROBE = """
+import warnings
+warnings.simplefilter("ignore")
+import cv2, sapien
+try:
+    device = sapien.Device("cuda")
+except RuntimeError:
+    device = sapien.Device("cpu")
+try:
+    sapien.render.RenderSystem(device)
+except RuntimeError as error:
+    print("none:", error)
+else:
+    name = sapien.render.get_device_summary().partition("GPU: ")[2].partition(chr(10))[0]
+    print("GPU:" if device.is_cuda() else "processor:", name)
+"""
+
 _FFMPEG_PROBE = """
 import imageio_ffmpeg
 print(imageio_ffmpeg.get_ffmpeg_version(), imageio_ffmpeg.get_ffmpeg_exe())
@@ -89,6 +107,7 @@ def examine() -> list[Finding]:
         jax_device(),
         jax_flags(os.environ),
         rendering(),
+        vulkan(),
         ffmpeg(),
         git(),
     ]
@@ -177,6 +196,20 @@ def rendering(environment: Mapping[str, str] = os.environ) -> Finding:
     cure = "sudo scripts/install_system_packages.sh, or: sudo apt-get install libegl1 libgl1-mesa-dri"
     cure += "" if backend == "egl" else "; then: unset MUJOCO_GL"
     return _finding("rendering", answer.ok or "warning", f"MUJOCO_GL={backend}: {answer.line}", cure)
+
+
+def vulkan(environment: Mapping[str, str] = os.environ) -> Finding:
+    """What SAPIEN, the simulator of ManiSkill, draws on: a GPU, the processor, or nothing."""
+    answer = _probe(_VULKAN_PROBE, environment)
+    if not answer.ok:
+        cure = "make install, or look above at sapien; then: sudo scripts/install_system_packages.sh sapien"
+        return _finding("vulkan", "warning", f"ManiSkill cannot start: {answer.line}", cure)
+    draws = not answer.line.startswith("none:")
+    value = answer.line if draws else f"{answer.line}. ManiSkill trains here all the same, without videos"
+    cure = (
+        "For videos: sudo scripts/install_system_packages.sh vulkan (Mesa 24 or newer), or a GPU's driver"
+    )
+    return _finding("vulkan", draws or "warning", value, cure)
 
 
 def ffmpeg() -> Finding:
