@@ -1,5 +1,7 @@
 """The ablation's tables: the paper's averages over task-seed runs, and who belongs into them."""
 
+import json
+
 import pytest
 
 from hcpg.report.ablation import ablated, ablation, candidate_table
@@ -28,6 +30,15 @@ def test_other_methods_and_tasks_without_an_arm_stay_out(groups):
     assert [variant.preset for variant in found.variants] == ["sac_flow", "hcpg_k2", "hcpg_flow", "hcpg_k8"]
     assert found.tasks == ["maniskill/pick-cube", "maniskill/push-cube"]
     assert ablated([group for group in groups if group.preset in ("sac", "sac_flow", "hcpg_flow")]) == []
+
+
+def test_an_arm_that_selects_in_training_alone_belongs_to_it(groups, write_run, tmp_path):
+    for seed in (0, 1):
+        path = write_run(preset="hcpg_training_only", seed=seed, task="maniskill/pick-cube", bare=[1] * 6)
+        config = {"budget": {"name": "cpu"}, "selector": {"rule": "hcpg", "candidates": 4}}
+        (path / "config.json").write_text(json.dumps(config))
+    presets = {group.preset for group in ablated(load_runs([tmp_path]))}
+    assert presets == {"sac_flow", "hcpg_k2", "hcpg_flow", "hcpg_k8", "hcpg_training_only"}
 
 
 def test_numbers_are_means_over_the_task_seed_runs(groups):

@@ -10,15 +10,15 @@ import numpy as np
 
 from hcpg.report.paper_tables import METHODS, MainTable, main_table, method_name
 from hcpg.report.protocol import one_protocol
-from hcpg.report.records import Curve, Group
+from hcpg.report.records import BARE, Curve, Group
 from hcpg.report.statistics import auc, final, last_five
 from hcpg.types import Float
 
 CANDIDATES = {"sac_flow": 1, "hcpg_k2": 2, "hcpg_flow": 4, "hcpg_k8": 8}
 """K of the presets that differ in nothing else; with one proposal there is nothing to select."""
 METRICS = ("Last-5", "AUC", "Final")
-_OTHER_METHODS = {"sac", "flowrl", "qsm"}
-_MAIN = {*_OTHER_METHODS, "sac_flow", "hcpg_flow"}
+_PAIR = {"sac_flow", "hcpg_flow"}
+"""The backbone alone and under the paper's selector: between them the arms stand."""
 _MEASURES: dict[str, Callable[[Curve], np.ndarray]] = {
     "Last-5": lambda curve: 100 * last_five(curve.rates),
     "AUC": lambda curve: auc(curve.steps, curve.rates),
@@ -54,10 +54,18 @@ def ablation_name(preset: str) -> str:
 def ablated(groups: Sequence[Group]) -> list[Group]:
     """The groups that belong into the ablation: the backbone under every selector, where one is an arm.
 
-    Tasks are those that any arm was run on; there are none where no arm was.
+    An arm is any other preset that selects. Tasks are those that an arm was run on; there are none where no
+    arm was.
     """
-    tasks = {group.task for group in groups if group.preset not in _MAIN}
-    return [group for group in groups if group.task in tasks and group.preset not in _OTHER_METHODS]
+    arms = {(group.task, group.preset) for group in groups if group.preset not in _PAIR and _selects(group)}
+    tasks, presets = {task for task, _ in arms}, {preset for _, preset in arms} | _PAIR
+    return [group for group in groups if group.task in tasks and group.preset in presets]
+
+
+def _selects(group: Group) -> bool:
+    """Whether a selector acts in training or at evaluation."""
+    in_training = group.runs[0].config.get("selector", {}).get("candidates", 1) > 1
+    return in_training or group.selector != BARE
 
 
 def ablation(groups: Sequence[Group]) -> Ablation:
