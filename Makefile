@@ -4,9 +4,8 @@ ROOT := $(shell cd "$$(dirname "$(strip $(MAKEFILE_LIST))")" && pwd)
 PYTHON_OF_PROJECT := .venv/bin/python
 # What a shell set up for another project (a ROS workspace, say) must not reach this one's packages.
 unexport PYTHONPATH PYTHONHOME
-# Two test processes share two cores: one thread each, for NumPy and for XLA.
-TEST_SETTINGS := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 JAX_PLATFORMS=cpu \
-	XLA_FLAGS="--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+# Two test processes share two cores: one thread each for NumPy, which pytest plug-ins load; the rest is in tests/conftest.py.
+TEST_SETTINGS := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
 .PHONY: help install demo test bench lint format lock

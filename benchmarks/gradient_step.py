@@ -12,7 +12,7 @@ from typing import Any
 
 from hcpg.types import Spec
 
-SINGLE_THREADED = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+SINGLE_THREADED = "--xla_cpu_multi_thread_eigen=false"
 SPEC = Spec(39, 4)
 CHUNK = 6
 UPDATES = 600

@@ -14,7 +14,7 @@ CALLS = 30
 
 def main() -> None:
     """Compile, warm up, then time many updates on one core."""
-    os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+    os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false"
     import jax
     from jax import numpy as jnp
 

@@ -17,7 +17,7 @@ MEASURED_STEPS = 8_000
 
 def main() -> None:
     """Train through the ordinary loop; the rate comes from its own rows of metrics."""
-    os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+    os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false"
     from hcpg import presets
     from hcpg.loops import sitting
 

@@ -14,7 +14,7 @@ CALLS, ENVIRONMENTS = 500, 8
 
 def main() -> None:
     """Measure on one core; print JSON."""
-    os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+    os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false"
     import jax
     import numpy as np
     from jax import numpy as jnp

@@ -49,7 +49,7 @@ def test_a_run_in_a_population_gives_the_numbers_it_gives_alone(tmp_path):
     for name in learned[0]:
         # An input that never changes gives its norm's scale a gradient of rounding errors alone, and Adam
         # makes of any gradient a step of the learning rate, 0.001.
-        tolerance = 5e-3 if name.endswith("scale") else 1e-5
+        tolerance = 1e-2 if name.endswith("scale") else 1e-5
         np.testing.assert_allclose(learned[2][name], learned[0][name], atol=tolerance, err_msg=name)
     assert max(np.abs(learned[1][name] - learned[0][name]).max() for name in learned[0]) > 0.1
     for own, beside in zip(alone.rows("episodes"), population[1].rows("episodes"), strict=True):

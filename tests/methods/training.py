@@ -1,6 +1,9 @@
 """One short training run through the real trainer, for tests that a preset learns."""
 
+from contextlib import contextmanager
 from dataclasses import replace
+
+import jax
 
 from hcpg import presets
 from hcpg.loops import sitting
@@ -15,13 +18,24 @@ BUDGET = {
 }
 
 
+@contextmanager
+def _optimised():
+    """Programs that run for half a minute repay the optimisations that tests go without (tests/conftest.py)."""
+    jax.config.update("jax_disable_most_optimizations", False)
+    try:
+        yield
+    finally:
+        jax.config.update("jax_disable_most_optimizations", True)
+
+
 def trained(task, preset, root, learner, steps, evaluations):
     """The evaluation rows of seed 0, by (step, selector), of `preset` with the `learner` settings changed."""
     chosen = presets.settings(task, preset, "cpu")
     budget = replace(chosen.budget, steps=steps, evaluations=evaluations, **BUDGET)
     settings = replace(chosen, learner=replace(chosen.learner, **learner), budget=budget)
     [folder] = sitting.create_folders(settings, [0], root)
-    assert sitting.sit(settings, [folder], 1, lambda event: None, lambda: False) == [True]
+    with _optimised():
+        assert sitting.sit(settings, [folder], 1, lambda event: None, lambda: False) == [True]
     rows = [row for row in folder.rows("episodes") if row["phase"] == "evaluation"]
     kinds = {(row["step"], row["selector"]) for row in rows}
     return {kind: [row for row in rows if (row["step"], row["selector"]) == kind] for kind in kinds}
