@@ -13,7 +13,9 @@ _CACHE = Path(__file__).parents[1] / ".cache"
 # Three quarters of the suite's time went into XLA's code generation: here programs are compiled quickly, not
 # well. What learns takes its optimisations back (tests/methods/training.py).
 _QUICKLY_COMPILED = (
-    "--xla_cpu_multi_thread_eigen=false --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1"
+    "--xla_cpu_multi_thread_eigen=false "
+    "--xla_cpu_use_fusion_emitters=false "
+    "--xla_backend_optimization_level=1"
 )
 
 os.environ.setdefault("JAX_PLATFORMS", "cpu")

@@ -1,5 +1,9 @@
 """Runs are laid onto cores, single-threaded, without a question to JAX where no accelerator can be."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from hcpg.loops import machine
@@ -16,6 +20,13 @@ def test_a_run_on_one_core_keeps_what_the_user_has_set():
         "XLA_FLAGS": f"{machine.ONE_THREAD_XLA} --xla_dump_to=/tmp/x",
     }
     assert machine.one_core(variables) == variables
+
+
+def test_xla_reads_what_the_user_has_set():
+    variables = machine.one_core({**os.environ, "XLA_FLAGS": "--xla_no_such_flag=1"})
+    command = [sys.executable, "-c", "import jax; jax.devices()"]
+    started = subprocess.run(command, env={**os.environ, **variables}, capture_output=True, text=True)
+    assert "Unknown flag in XLA_FLAGS: --xla_no_such_flag=1" in started.stderr
 
 
 def test_processes_on_one_gpu_share_its_memory():

@@ -20,7 +20,7 @@ BUDGET = {
 
 @contextmanager
 def _optimised():
-    """Programs that run for half a minute repay the optimisations that tests go without (tests/conftest.py)."""
+    """Programs that run for half a minute repay the optimisations that tests go without."""
     jax.config.update("jax_disable_most_optimizations", False)
     try:
         yield
