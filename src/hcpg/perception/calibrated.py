@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from hcpg.robot_types import RobotError, Sight, Sighting, Snapshot
-from hcpg.types import Float
+from hcpg.types import Tensor
 
 
 class Calibrated:
     """Positions that never age, in the base frame, m."""
 
-    def __init__(self, positions: Mapping[str, Float[np.ndarray, " 3"]]) -> None:
+    def __init__(self, positions: Mapping[str, Tensor]) -> None:
         """The positions by object.
 
         Raises:
@@ -41,7 +41,7 @@ class Calibrated:
         if missing:
             has = ", ".join(stored) or "nothing"
             raise RobotError(
-                f"{path} has no position of {', '.join(missing)}; it has {has}. Touch it off first."
+                f"{path} lacks the position of {', '.join(missing)}; it has {has}. Touch it off first."
             )
         return cls({name: np.asarray(stored[name], np.float64) for name in objects})
 
