@@ -63,10 +63,14 @@ def robot_task(name: str) -> RobotTask:
     Raises:
         UnknownNameError: there is no such task, or no arm does it.
     """
-    done = [each for each in names("tasks") if hasattr(_task_file(each), "ROBOT_TASK")]
-    if name not in done:
-        raise UnknownNameError("task of an arm", name, done)
+    if name not in robot_task_names():
+        raise UnknownNameError("task of an arm", name, robot_task_names())
     return _task_file(name).ROBOT_TASK
+
+
+def robot_task_names() -> list[str]:
+    """Every task that an arm can do."""
+    return [name for name in names("tasks") if hasattr(_task_file(name), "ROBOT_TASK")]
 
 
 def task(name: str) -> Task:

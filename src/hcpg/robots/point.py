@@ -171,7 +171,13 @@ class PointRobot:
     kind: Kind = "twin"
 
     def make(self, task: str, address: str | None) -> Rig:
-        """The arm for any task whose objects are called `object` and `goal`."""
+        """The arm, with one object and one goal in sight.
+
+        Raises:
+            RobotError: the task is none of the suite `point`.
+        """
+        if not task.startswith("point/"):
+            raise RobotError(f"the point arm cannot do {task}; give it a task of the suite point")
         stage = PointStage()
         return Rig(PointArm(), NoisyTruth(lambda: stage.places, Poorness(dropouts=0.0), seed=0), stage)
 
