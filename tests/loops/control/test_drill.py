@@ -122,6 +122,13 @@ def test_a_fault_costs_its_recovery_and_a_reset(outcomes):
     assert costs["recovery_fails"] - costs["reflex"] == pytest.approx(1.5)
 
 
+def test_the_wall_of_the_box_was_reached(outcomes):
+    # 25 cm at 20 mm a step, with a lag: long before the 60th action; from then on every action is limited.
+    for name in ("out_of_box", "huge_action"):
+        assert outcomes[name]["limited"]["box"] > 50
+    assert outcomes["none"]["limited"].get("box", 0) == 0
+
+
 def test_what_travelled_when_the_reflex_came_is_refused_afterwards(outcomes):
     # The ticks 15 to 18 sent their commands on a way of 200 ms; tick 19 had the reflex.
     assert outcomes["late_commands_and_reflex"]["refused"]["epoch"] >= 4

@@ -146,6 +146,8 @@ class Outcome(NamedTuple):
     """Commands that reached the arm while it was in a reflex, disconnected or stopped by a person."""
     refused: Mapping[str, int]
     """Commands that the driver's gate refused, by reason."""
+    limited: Mapping[str, int]
+    """Ticks at which a limit changed the action, by limit."""
     ticks: int
     logged: int
     """Steps in the log; each tick has to be there."""
@@ -197,10 +199,17 @@ def _outcome(fault: Fault, site: Site, session: SessionResult, log: Path) -> Out
         furthest_outside_mm=1000 * seen.furthest_outside_m,
         applied_while_wrong=seen.applied_while_wrong,
         refused=dict(seen.refused),
+        limited=_limited(session),
         ticks=sum(len(each.records) for each in episodes),
         logged=len(_logged_ticks(log)),
         cost_s=episodes[1].records[0].tick.woke_s - begin_s if len(episodes) > 1 else float("nan"),
     )
+
+
+def _limited(session: SessionResult) -> dict[str, int]:
+    records = [record for episode in session.episodes for record in episode.records]
+    touched = [name for record in records if record.limited is not None for name in record.limited.touched]
+    return {name: touched.count(name) for name in dict.fromkeys(touched)}
 
 
 def _logged_ticks(log: Path) -> set[tuple[int, int]]:

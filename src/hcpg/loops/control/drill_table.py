@@ -18,6 +18,7 @@ COLUMNS = (
     "cost, s",
     "outside the box, mm",
     "moved in a hold, mm",
+    "ticks at the box",
     "commands while wrong",
     "steps logged",
 )
@@ -61,6 +62,7 @@ def _cells(name: str, outcome: Outcome) -> Sequence[str]:
         _number(outcome.cost_s, 1),
         _number(outcome.furthest_outside_mm, 1),
         _number(outcome.moved_while_held_mm, 1),
+        str(outcome.limited.get("box", 0)),
         str(outcome.applied_while_wrong),
         f"{outcome.logged} of {outcome.ticks}",
     )
