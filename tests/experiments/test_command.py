@@ -3,7 +3,7 @@
 import os
 
 import pytest
-from stand_ins import StandInPlace, create
+from stand_in_jobs import StandInPlace, create
 from tiny_cells import cell
 
 from hcpg import cli

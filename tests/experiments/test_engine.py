@@ -4,7 +4,7 @@ import os
 import signal
 
 import pytest
-from stand_ins import StandInPlace, create
+from stand_in_jobs import StandInPlace, create
 from tiny_cells import cell
 
 from hcpg.experiments import engine
@@ -120,7 +120,7 @@ def test_a_signal_lets_the_jobs_save_and_a_second_one_kills_them(signals, stops,
         else:
             os.kill(os.getpid(), signal.SIGTERM)
 
-    monkeypatch.setattr("stand_ins.StandInJob.stop", stopped)
+    monkeypatch.setattr("stand_in_jobs.StandInJob.stop", stopped)
 
     def interrupt(text):
         told.append(text)

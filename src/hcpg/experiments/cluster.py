@@ -7,6 +7,7 @@ locks hold wherever the nodes are, and the cluster may be any.
 
 import logging
 import os
+import socket
 from io import TextIOWrapper
 from math import floor
 from pathlib import Path
@@ -18,6 +19,8 @@ from hcpg.experiments.ledger import Entry
 from hcpg.experiments.parcels import land, pack
 from hcpg.experiments.station import SEND_S, News, Order, Station
 from hcpg.experiments.units import Unit, command
+
+CONNECT_S = 10.0
 
 
 class ClusterError(RuntimeError):
@@ -39,18 +42,26 @@ class RayCluster:
 
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         try:
+            _knock(address)
             ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
-        except ConnectionError as error:
+        except OSError as error:
             raise ClusterError(
-                f"no Ray cluster answers at {address!r} ({error}). Start one (`ray start --head`), see "
-                "docs/cluster.md, and give its HOST:6379, or auto on one of its machines."
+                f"no Ray cluster answers at {address!r} ({error}). Start one (`ray start --head`, see "
+                "docs/cluster.md) and give its HOST:6379, or auto on one of its machines."
             ) from error
         self.together = gpus_per_job > 0
         self._needs = {"CPU": float(cores_per_job), "GPU": gpus_per_job}
         self._send_s = send_s
         self._jobs: list[RayJob] = []
         if self._capacity() == 0:
-            raise ClusterError(f"no node has room for a job of {self._needs}; there are: {_resources()}")
+            offers = "; ".join(
+                f"{each.get('CPU', 0):g} cores, {each.get('GPU', 0):g} GPUs" for each in _resources()
+            )
+            self.close()
+            raise ClusterError(
+                f"no node has room for a job of {cores_per_job} cores and {gpus_per_job:g} GPUs "
+                f"(--cores-per-job, --gpus-per-job). The cluster's nodes have: {offers}."
+            )
 
     def room(self) -> bool:
         """Whether the nodes that are alive could hold one more job of this launch."""
@@ -133,6 +144,13 @@ class RayJob:
         with self._log.open("a") as log:
             log.write(f"{why}\n")
         return code
+
+
+def _knock(address: str) -> None:
+    """Fail at once where nothing listens; Ray itself would wait for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if host and port.isdigit():
+        socket.create_connection((host, int(port)), timeout=CONNECT_S).close()
 
 
 def _resources() -> list[dict[str, float]]:
