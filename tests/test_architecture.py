@@ -151,10 +151,11 @@ def test_everything_public_has_a_docstring():
 
 
 def plugin_names() -> set[str]:
-    """Methods, suites and tasks, tasks with and without their suite."""
+    """Methods, suites, robots and tasks, tasks with and without their suite."""
     tasks = registry.names("tasks")
     short = {name.partition("/")[2] for name in tasks}
-    return {*registry.names("methods"), *registry.names("suites"), *tasks, *short}
+    kinds = ("methods", "suites", "robots")
+    return {*tasks, *short, *(name for kind in kinds for name in registry.names(kind))}
 
 
 def test_loops_never_name_a_plugin():
