@@ -8,7 +8,7 @@ unexport PYTHONPATH PYTHONHOME
 TEST_SETTINGS := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test bench lint format lock
+.PHONY: help install demo twin test bench lint format lock
 
 help: ## Show the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' "$(ROOT)/Makefile"
@@ -18,6 +18,9 @@ install: ## Install what the demo and training need into .venv
 
 demo: install ## Train hcpg_flow and sac_flow side by side on a Meta-World task (under 10 minutes on 2 cores)
 	@cd "$(ROOT)" && scripts/prepare_rendering.sh && $(PYTHON_OF_PROJECT) scripts/demo.py $(ARGS)
+
+twin: install ## Make the environment of the served twin, .venv-twin, and add the arm's driver to .venv
+	@"$(ROOT)/scripts/install_twin.sh"
 
 test: ## Run the tests (14 minutes on 2 cores; under 10 is the aim)
 	@"$(ROOT)/scripts/install.sh" run test

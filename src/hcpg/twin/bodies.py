@@ -10,6 +10,10 @@ from hcpg.types import Float
 
 HOME_ANGLES = np.array([0.0, -0.35, 0.0, -2.5, 0.0, 2.15, 0.785])
 """Joint angles with the hand down in front of the base, rad; the start of every search."""
+FLANGE_M = 0.107
+"""From the seventh link's frame to the flange, along z."""
+HAND_M = 0.1034
+"""From the flange to the TCP between the finger pads, along z; the hand is turned by -45 degrees about it."""
 FINGER_STIFFNESS_N_M, FINGER_DAMPING_N_S_M, FINGER_FORCE_N = 1000.0, 20.0, 100.0
 """Of one finger: franka-sim's hand, so that both twins grip alike."""
 _TRIES, _CLOSE_M, _DAMPING = 100, 1e-5, 1e-4

@@ -39,13 +39,12 @@ class Physics:
         self.data.qpos[self.at.arm] = angles_for(self.model, layout.start, HOME_ANGLES)
         self.grip = self.scene.home_grip
         self.data.qpos[self.at.fingers] = self._finger_target()
-        self._mujoco.mj_forward(self.model, self.data)
+        self.refresh()
         self._impedance.relax()
         self.target = self.position
 
-    def arrange(self, layout: Layout) -> None:
-        """Put the things where the layout says and leave the arm as it is."""
-        arrange(self.model, self.data, layout)
+    def refresh(self) -> None:
+        """Work out all positions anew, after something was put elsewhere."""
         self._mujoco.mj_forward(self.model, self.data)
 
     def step(self) -> None:

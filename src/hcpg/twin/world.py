@@ -2,45 +2,39 @@
 
 import threading
 
-import numpy as np
-
 from hcpg.robot_types import Snapshot
-from hcpg.twin.judging import Judge, Truth
+from hcpg.twin.bench import Bench, Places
+from hcpg.twin.judging import Truth
 from hcpg.twin.physics import STEPS_PER_TICK, TIMESTEP_S, Physics
-from hcpg.twin.scenes import Layout, layout, scene
-from hcpg.types import Float
+from hcpg.twin.scenes import scene
 
-CLEAR_M = 0.03
-"""The arm is clear of the things when it is no more than this below its home."""
 _SAME_STEP = 1e-6
 
 
 class World:
-    """One task's scene with its clock, its stage and its judge. It is a `Clock` and a `Stage`."""
+    """One task's scene with its clock and its table: a `Clock` and a `Stage`. Any thread may call it."""
 
     def __init__(self, task: str, seed: int) -> None:
         """Start states are the set that `seed` names; the scene begins laid out as start state 0."""
-        self.task, self.scene, self._seed = task, scene(task), seed
+        self.task, self.scene = task, scene(task)
         self.physics = Physics(self.scene)
-        self.judge = Judge(task, self.physics.model, self.physics.data)
+        self._bench = Bench(task, seed, self.physics.model, self.physics.data)
         self.lock = threading.RLock()
-        self._pending: Layout | None = None
-        self._layout = layout(self.scene, seed, 0)
         self.place(0)
 
     def place(self, start: int) -> None:
         """Lay out start state `start`, the arm too; time begins anew. So begins an episode of training."""
         with self.lock:
             self.physics.steps = 0
-            self._pending, self._layout = None, layout(self.scene, self._seed, start)
-            self.physics.lay_out(self._layout)
-            self.judge.restart()
+            laid_out = self._bench.layout(start)
+            self.physics.lay_out(laid_out)
+            self._bench.begin(laid_out)
 
     def arrange(self, start: int) -> None:
-        """Lay out start state `start` around the arm: at once, or as soon as the arm is clear of it."""
+        """Lay out start state `start` around the arm, as soon as the arm is clear of the things."""
         with self.lock:
-            self._pending = layout(self.scene, self._seed, start)
-            self._arrange_when_clear()
+            self._bench.ask_for(start)
+            self._tick()
 
     def now_s(self) -> float:
         """Simulated seconds since the last `place`."""
@@ -50,15 +44,9 @@ class World:
         """Run the physics until then."""
         with self.lock:
             while self.physics.steps + _SAME_STEP < time_s / TIMESTEP_S:
-                self.step()
-
-    def step(self) -> None:
-        """One time step; every sixteenth is a tick, at which the judge looks."""
-        with self.lock:
-            self.physics.step()
-            if self.physics.steps % STEPS_PER_TICK == 0:
-                self._arrange_when_clear()
-                self.judge.tick()
+                self.physics.step()
+                if self.physics.steps % STEPS_PER_TICK == 0:
+                    self._tick()
 
     def snapshot(self, epoch: int, begun_s: float = 0.0) -> Snapshot:
         """What the arm reports; `begun_s` is the time at the last `place`."""
@@ -74,28 +62,19 @@ class World:
     def truth(self) -> Truth:
         """What is true now."""
         with self.lock:
-            return self.judge.look()
+            return self._bench.truth()
 
-    def surveyed(self) -> dict[str, Float[np.ndarray, " 3"]]:
-        """Where the thing that does not move was touched off, by its name; empty where none is needed."""
-        if not self.scene.fixed:
-            return {}
+    def surveyed(self) -> Places:
+        """Where the thing that does not move was touched off, m, by its name; empty where none is needed."""
         with self.lock:
-            truth = self.judge.look()
-            place = truth.goal if self.scene.moving else self.judge.first
-            return {self.scene.fixed: place + self._layout.survey}
+            return self._bench.surveyed()
 
-    def moving(self) -> dict[str, Float[np.ndarray, " 3"]]:
-        """Where the thing that a camera follows is now, by its name; empty where nothing moves."""
-        return {self.scene.moving: self.truth().object} if self.scene.moving else {}
+    def moving(self) -> Places:
+        """Where the thing that a camera follows is now, m, by its name; empty where nothing moves."""
+        with self.lock:
+            return self._bench.moving()
 
-    def _arrange_when_clear(self) -> None:
-        if self._pending is not None and clear(self.physics.position, self.scene.home):
-            self._layout, self._pending = self._pending, None
-            self.physics.arrange(self._layout)
-            self.judge.restart()
-
-
-def clear(position: Float[np.ndarray, " 3"], home: tuple[float, float, float]) -> bool:
-    """Whether a TCP position is high enough for things to be laid out under it."""
-    return bool(position[2] > home[2] - CLEAR_M)
+    def _tick(self) -> None:
+        if self._bench.tick():
+            self.physics.refresh()
+            self._bench.begin_pending()

@@ -6,14 +6,11 @@ import numpy as np
 
 from hcpg.robot_types import Ack, Check, Command, Grip, Info, Limits, Recovery, RobotError, Snapshot
 from hcpg.safety.gate import Gate
+from hcpg.safety.way import Way
 from hcpg.twin.limits import limits
 from hcpg.twin.world import World
-from hcpg.types import Float, Tensor
 
-RESET_SPEED_M_S = 0.15
-ARRIVED_M = 0.004
 UPRIGHT_RAD = 0.1
-_TICK_S = 1.0 / 30.0
 
 
 class FastTwin:
@@ -23,7 +20,7 @@ class FastTwin:
         self.limits: Limits = limits(world.task)
         self.clock: World = world
         self._world, self._gate = world, Gate(self.limits)
-        self._holds = False
+        self._holds = True
 
     def connect(self, timeout_s: float) -> Info:
         """Hold where it is; there is nothing to wait for.
@@ -31,14 +28,12 @@ class FastTwin:
         Raises:
             RobotError: the hand does not point down, so commands would not mean what they say.
         """
-        checks = (self._upright(),)
-        failed = [check for check in checks if not check.passed]
-        if failed:
-            raise RobotError(f"{failed[0].name}: {failed[0].found}; {failed[0].cure}")
+        check = self._upright()
+        if not check.passed:
+            raise RobotError(f"{check.name}: no, {check.found}; {check.cure}")
         self._gate.open()
-        self._holds = False
-        self.hold()
-        return Info("fast twin", "twin", {"mujoco": version("mujoco")}, checks)
+        self._stay()
+        return Info("fast twin", "twin", {"mujoco": version("mujoco")}, (check,))
 
     def observe(self) -> Snapshot:
         """The state now."""
@@ -51,9 +46,7 @@ class FastTwin:
     def hold(self) -> None:
         """The target becomes the measured position and stays there; no effect after a stop."""
         if not self._holds and not self._gate.closed:
-            with self._world.lock:
-                self._world.physics.target = self._world.physics.position
-            self._holds = True
+            self._stay()
 
     def stop(self, reason: str) -> None:
         """Hold and refuse whatever comes."""
@@ -65,32 +58,30 @@ class FastTwin:
         if self._gate.closed:
             return Recovery(False, True, "the robot was stopped; connect first")
         self._gate.advance()
-        self._holds = False
-        self.hold()
-        return Recovery(True, False, "")
+        self._stay()
+        return Recovery(True, False, "there was nothing to clear")
 
     def reset(self, position: tuple[float, float, float], grip: Grip, timeout_s: float) -> None:
-        """Straight up, across, and down to a start position.
+        """Up, across and down to a start position, in simulated time.
 
         Raises:
-            RobotError: it was stopped, or it is not there in time, simulated seconds.
+            RobotError: it was stopped, or it did not get there in time.
         """
-        if self._gate.closed:
-            raise RobotError("the robot was stopped; connect first")
         self._gate.advance()
-        until_s = self._world.now_s() + timeout_s
-        goal = np.array(position, np.float64)
         self._grip(grip)
-        for point in way(self._world.physics.position, goal):
-            self._follow(point, until_s)
-        away = float(np.linalg.norm(self._world.physics.position - goal))
-        if away > ARRIVED_M:
-            raise RobotError(
-                f"the arm is {1000 * away:.0f} mm from its start after {timeout_s} s; see what blocks it"
-            )
+        physics, clock = self._world.physics, self.clock
+        way = Way(physics.position, np.array(position), self.limits.step_m)
+        until_s = clock.now_s() + timeout_s
+        while (target := way.target(physics.position)) is not None:
+            if self._gate.closed:
+                raise RobotError("the robot is stopped; connect first")
+            if clock.now_s() > until_s:
+                self._stay()
+                raise RobotError(f"the arm is not at its start after {timeout_s:g} s; see what blocks it")
+            physics.target = target
+            clock.sleep_until(clock.now_s() + 1.0 / self.limits.rate_hz)
         self._gate.advance()
-        self._holds = False
-        self.hold()
+        self._stay()
 
     def close(self) -> None:
         """Stop."""
@@ -106,27 +97,14 @@ class FastTwin:
         if grip != "keep":
             self._world.physics.grip = grip
 
-    def _follow(self, goal: Float[np.ndarray, " 3"], until_s: float) -> None:
-        """Lead the arm to `goal` with a target that moves slowly, and stays once it is there."""
-        clock, physics = self._world, self._world.physics
-        while np.linalg.norm(goal - physics.position) > ARRIVED_M / 2 and clock.now_s() < until_s:
-            if self._gate.closed:
-                raise RobotError("the robot was stopped on the way to its start")
-            lead = goal - physics.position
-            step = self.limits.step_m
-            length = float(np.linalg.norm(lead))
-            physics.target = goal if length < step else physics.position + lead * (step / length)
-            clock.sleep_until(clock.now_s() + _TICK_S)
+    def _stay(self) -> None:
+        with self._world.lock:
+            self._world.physics.target = self._world.physics.position
+        self._holds = True
 
     def _upright(self) -> Check:
         physics = self._world.physics
-        down = -physics.data.site_xmat[physics.at.tcp].reshape(3, 3)[2, 2]
-        tilt_rad = float(np.arccos(np.clip(down, -1.0, 1.0)))
-        cure = "lay out a start state"
-        return Check("the hand points down", tilt_rad < UPRIGHT_RAD, f"tilted {tilt_rad:.3f} rad", cure)
-
-
-def way(start: Float[Tensor, " 3"], goal: Float[np.ndarray, " 3"]) -> list[Float[np.ndarray, " 3"]]:
-    """Straight up first, so that nothing is dragged along; then across; then to the goal."""
-    height = max(float(start[2]), float(goal[2]))
-    return [np.array([start[0], start[1], height]), np.array([goal[0], goal[1], height]), goal]
+        down = -float(physics.data.site_xmat[physics.at.tcp].reshape(3, 3)[2, 2])
+        tilt_rad = float(np.arccos(min(max(down, -1.0), 1.0)))
+        found = f"tilted by {tilt_rad:.3f} rad"
+        return Check("the hand points down", tilt_rad < UPRIGHT_RAD, found, "lay out a start state")
