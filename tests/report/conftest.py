@@ -33,6 +33,16 @@ def episode_rows():
 
 @pytest.fixture
 def write_run(tmp_path):
+    return _writer(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def run_writer():
+    """As `write_run`, for runs in a folder that outlives a test."""
+    return _writer
+
+
+def _writer(root):
     """Writes a run evaluated every 100 steps; `success` and `bare` count the successes of each evaluation.
 
     Without a `selector` there are bare evaluations only.
@@ -49,7 +59,7 @@ def write_run(tmp_path):
         run_id="a",
         task="point/reach",
     ):
-        path = tmp_path / task / preset / f"s{seed}" / run_id
+        path = root / task / preset / f"s{seed}" / run_id
         path.mkdir(parents=True)
         address = {"id": run_id, "task": task, "preset": preset, "seed": seed}
         (path / "manifest.json").write_text(json.dumps({"run": address}))

@@ -87,25 +87,54 @@ def _at_step(rows: Episodes, step: int) -> Episodes:
     return Episodes(*(column[there] for column in rows))
 
 
+class Contrast(NamedTuple):
+    """Two presets on the same seeds and start states, and the first's rate less the second's."""
+
+    first: Outcomes
+    second: Outcomes
+    paired: Estimate
+    """Seeds and start states resampled."""
+    independent: Estimate
+    """Episodes taken as independent (Newcombe)."""
+
+    @property
+    def decisive(self) -> Estimate:
+        """The paired one, unless all pairs are equal, so that its interval has no width."""
+        return self.paired if self.paired.interval.low < self.paired.interval.high else self.independent
+
+    @property
+    def conclusion(self) -> str:
+        """What may be said of the first against the second, and what may not."""
+        return conclusion(self.first, self.second, self.decisive)
+
+
+def contrast(first: Outcomes, second: Outcomes) -> Contrast:
+    """Both on the seeds that they have in common.
+
+    Raises:
+        RecordError: another task or protocol, other start states, or no seed in common.
+    """
+    first, second = _paired(first, second)
+    paired = paired_bootstrap(first.successes, second.successes)
+    return Contrast(first, second, paired, newcombe(first.total, second.total))
+
+
 def compared(first: Outcomes, second: Outcomes) -> str:
     """The comparison as plain text.
 
     Raises:
-        RecordError: another task, adapter, number of steps or set of start states, or no seed in common.
+        RecordError: another task or protocol, other start states, or no seed in common.
     """
-    first, second = _paired(first, second)
-    paired = paired_bootstrap(first.successes, second.successes)
-    independent = newcombe(first.total, second.total)
-    facts = first.protocol
-    seeds = " ".join(map(str, first.seeds))
+    found = contrast(first, second)
+    facts, seeds = found.first.protocol, " ".join(map(str, found.first.seeds))
     lines = [
         f"{facts['task']}, adapter {facts['adapter']}, last evaluation at step {facts['steps']}, "
-        f"seeds {seeds}, {len(first.starts)} start states",
-        *(_rates(each) for each in (first, second)),
-        f"difference {100 * paired.estimate:+.1f} points",
-        f"  paired, seeds and start states resampled: {_points(paired)}",
-        f"  episodes taken as independent (Newcombe): {_points(independent)}",
-        conclusion(first, second, paired if paired.interval.low < paired.interval.high else independent),
+        f"seeds {seeds}, {len(found.first.starts)} start states",
+        *(_rates(each) for each in (found.first, found.second)),
+        f"difference {100 * found.paired.estimate:+.1f} points",
+        f"  paired, seeds and start states resampled: {_points(found.paired)}",
+        f"  episodes taken as independent (Newcombe): {_points(found.independent)}",
+        found.conclusion,
     ]
     return "\n".join(lines)
 

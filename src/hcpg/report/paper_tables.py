@@ -6,7 +6,8 @@ that over the tasks' means; both are sample SDs, and neither is a confidence int
 
 import csv
 import io
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from hcpg.report.booktabs import booktabs
 from hcpg.report.protocol import one_protocol
 from hcpg.report.records import Group
-from hcpg.report.statistics import Spread, last_five, spread
+from hcpg.report.statistics import Spread, StatisticsError, last_five, spread
 from hcpg.report.tables import aligned
 
 METHODS = {
@@ -52,7 +53,8 @@ def main_table(groups: Sequence[Group]) -> MainTable:
         StatisticsError: a run has fewer than five evaluations.
     """
     protocol = one_protocol(groups)
-    cells = {(task_name(group.task), method_name(group.preset)): _last_five(group) for group in groups}
+    names = task_names(group.task for group in groups)
+    cells = {(names[group.task], method_name(group.preset)): _last_five(group) for group in groups}
     tasks = sorted({task for task, _ in cells})
     known = [*METHODS.values(), *sorted({method for _, method in cells} - set(METHODS.values()))]
     methods = [name for name in known if any(method == name for _, method in cells)]
@@ -66,13 +68,23 @@ def main_table(groups: Sequence[Group]) -> MainTable:
 
 def _last_five(group: Group) -> Spread:
     curve = group.curve(group.selector)
-    assert curve is not None
-    return spread(100 * last_five(curve.rates))
+    assert curve is not None  # `one_protocol` refuses such a group
+    try:
+        return spread(100 * last_five(curve.rates))
+    except StatisticsError as error:
+        raise StatisticsError(f"{group.preset} on {group.task}: {error}") from error
 
 
 def task_name(task: str) -> str:
     """`metaworld/button-press` as the paper writes it: ButtonPress."""
     return "".join(word.capitalize() for word in task.rpartition("/")[2].split("-"))
+
+
+def task_names(tasks: Iterable[str]) -> dict[str, str]:
+    """Every task's name; tasks of two suites that would have the same one keep their own."""
+    names = {task: task_name(task) for task in tasks}
+    counts = Counter(names.values())
+    return {task: name if counts[name] == 1 else task for task, name in names.items()}
 
 
 def method_name(preset: str) -> str:
@@ -104,12 +116,13 @@ def latex(table: MainTable) -> str:
 
 
 def _rows(table: MainTable, form: str, best: str, absent: str) -> list[list[str]]:
-    """A row per task and one across them; the best printed means of a row are marked."""
+    """A row per task and one across them; the best printed means of a row are marked, if it has several."""
     rows = [[table.cells.get((task, method)) for method in table.methods] for task in table.tasks]
     rows.append([table.across.get(method) for method in table.methods])
     texts = []
     for name, row in zip([*table.tasks, ACROSS], rows, strict=True):
-        top = max((round(each.mean, 1) for each in row if each is not None), default=None)
+        means = [round(each.mean, 1) for each in row if each is not None]
+        top = max(means) if len(means) > 1 else None
         cells = [absent if each is None else form.format(*_printed(each)) for each in row]
         marked = [
             best.format(cell) if each is not None and round(each.mean, 1) == top else cell

@@ -44,7 +44,8 @@ def protocol(group: Group) -> dict[str, str]:
     curve = group.curve(group.selector)
     if curve is None or not curve.steps.size:
         raise RecordError(f"{_name(group)}: its seeds have no evaluation in common. Train on.")
-    shared((run.name, dotted(run.config)) for run in group.runs)
+    distinct = {id(run.config): run for run in group.runs}  # runs share the object of equal settings
+    shared((run.name, dotted(run.config)) for run in distinct.values())
     return {
         "budget": group.runs[0].config["budget"]["name"],
         "steps": f"{curve.steps[-1]:,}",

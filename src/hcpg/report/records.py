@@ -2,7 +2,8 @@
 
 import json
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -57,6 +58,8 @@ class Record(NamedTuple):
     """The same, episode by episode."""
     config: Mapping[str, Any]
     """The resolved settings; runs with equal ones share the object, so it is not to be changed."""
+    manifest: Mapping[str, Any]
+    """Where the run comes from; parts that are equal in several runs are one object, too."""
     status: Mapping[str, Any]
     wall_s: float
     """Time of the training so far; NaN without metrics."""
@@ -90,11 +93,11 @@ class Group(NamedTuple):
         curves = [run.curves[selector] for run in self.runs if selector in run.curves]
         if len(curves) < len(self.runs):
             return None
-        steps = sorted(set.intersection(*(set(curve.steps.tolist()) for curve in curves)))
-        places = [np.isin(curve.steps, steps) for curve in curves]
-        successes = [curve.successes[place] for curve, place in zip(curves, places, strict=True)]
-        episodes = [curve.episodes[place] for curve, place in zip(curves, places, strict=True)]
-        return Curve(np.array(steps, dtype=int), np.stack(successes), np.stack(episodes))
+        curves = _at_common_steps(curves)
+        successes, episodes = (
+            np.stack(counts) for counts in zip(*(curve[1:] for curve in curves), strict=True)
+        )
+        return Curve(curves[0].steps, successes, episodes)
 
     @property
     def selector(self) -> str:
@@ -102,9 +105,22 @@ class Group(NamedTuple):
         return self.runs[0].selector
 
 
+def _at_common_steps(curves: Sequence[Curve]) -> Sequence[Curve]:
+    """Each curve at the steps that all have."""
+    if all(np.array_equal(curve.steps, curves[0].steps) for curve in curves):
+        return curves
+    steps = sorted(set.intersection(*(set(curve.steps.tolist()) for curve in curves)))
+    places = [np.isin(curve.steps, steps) for curve in curves]
+    return [Curve(*(counts[place] for counts in curve)) for curve, place in zip(curves, places, strict=True)]
+
+
 def find_runs(root: Path) -> list[Path]:
     """The run folders at or under `root`, oldest first."""
-    found = [file.parent for file in root.rglob("manifest.json")]
+    found = []
+    for folder, inner, files in os.walk(root):
+        if "manifest.json" in files:
+            inner.clear()
+            found.append(Path(folder))
     # A name that begins with a dot belongs to a folder that was still being made when its process died.
     return sorted((run for run in found if not run.name.startswith(".")), key=lambda run: run.name)
 
@@ -157,7 +173,7 @@ def json_object(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise RecordError(f"there is no {path}. Restore it, or remove the rest of that run.")
     try:
-        found = _parsed(path.read_bytes())
+        found = _parsed(path.read_text())
     except ValueError as error:
         raise RecordError(f"{path} is damaged ({error}). Restore it.") from error
     if not isinstance(found, dict):
@@ -197,6 +213,7 @@ def load_run(path: Path) -> Record:
         curves={name: _curve(path, name, each) for name, each in evaluations.by_selector.items()},
         episodes=evaluations.by_selector,
         config=config,
+        manifest={key: _parsed(json.dumps(part)) for key, part in manifest.items()},
         status=status,
         wall_s=float("nan") if metrics is None else float(metrics.get("wall_s") or "nan"),
     )
