@@ -12,6 +12,7 @@ from pathlib import Path
 from hcpg.commands import report
 from hcpg.commands.options import check
 from hcpg.experiments import engine, ledger
+from hcpg.experiments.adoption import adopt
 from hcpg.experiments.forecast import hours_left
 from hcpg.experiments.protocols import PROTOCOLS, Protocol, protocol
 
@@ -69,6 +70,9 @@ def _run(options: argparse.Namespace, chosen: Protocol) -> int:
     for settings in chosen.settings():
         check(settings)
     cells, results = chosen.cells(), options.out / options.name
+    taken = adopt(cells, results, [options.out / name for name in PROTOCOLS if name != options.name])
+    if taken:
+        _say(f"{len(taken)} runs are taken over from other experiments in {options.out}")
     with closing(_place(options)) as place:
         ended = engine.run(cells, results, place, _say)
     if ended.signal is not None:
