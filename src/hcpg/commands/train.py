@@ -18,7 +18,10 @@ from hcpg.loops.display import Progress, view
 from hcpg.loops.population import Ended, lane_of
 from hcpg.loops.runs import RunFolder
 from hcpg.loops.sitting import EXTENDABLE, extended, seed_of
+from hcpg.loops.tracking import TrackedView
 from hcpg.presets import Settings
+from hcpg.report.extras import require
+from hcpg.report.trackers import PACKAGES, TRACKERS
 
 DESCRIPTION = """Train runs (one per preset and seed), or continue runs with --resume. On a CPU every run is a
 process on one core; on a GPU all seeds of a preset are trained together."""
@@ -46,9 +49,15 @@ def run(arguments: Sequence[str]) -> int:
         parser.error("a run of one task, preset and seed is named twice; train such runs one after another")
     progress = {lane: Progress(lane, warmup) for lane, warmup in lanes.items()}
     console = Console()
+    for name in names.tracker:
+        require(PACKAGES[name], "trackers")
     with view(console, progress, _heading(jobs)) as shown:
-        ended = population.train(jobs, shown, machine.has_accelerator())
+        tracked = TrackedView(shown, lanes, names.tracker)
+        ended = population.train(jobs, tracked, machine.has_accelerator())
     _report(console, ended)
+    trouble = tracked.finish()
+    if trouble:
+        console.print(trouble, soft_wrap=True, markup=False, highlight=False)
     return exit_code(ended)
 
 
@@ -75,6 +84,13 @@ def _parser() -> argparse.ArgumentParser:
     add("--adapter", help="how the task's scene is read: paper (default) or contact")
     add("--seeds", type=int, nargs="+", default=[0], help="one run each; default: 0")
     add("--steps", type=int, help="environment steps per run; with --resume, extends a finished run")
+    add(
+        "--tracker",
+        nargs="+",
+        choices=list(TRACKERS),
+        default=[],
+        help="mirror the rows there while training",
+    )
     add("--out", type=Path, default=Path("runs"), help="where new run folders go; default: runs")
     add(
         "--resume", type=Path, nargs="+", metavar="RUN", help="run folders to continue from their checkpoints"
