@@ -3,6 +3,7 @@
 #   sapien  without which ManiSkill and its simulator SAPIEN cannot be imported (Meta-World needs none)
 #   opengl  with which MuJoCo (Meta-World) draws without a display and without a GPU, by Mesa
 #   vulkan  with which SAPIEN (ManiSkill) does, by Mesa 24 or newer
+#   browser Chromium, in which the tests open a report's page; installed where it is named only
 # Debian and Ubuntu; works as root, or through sudo, and does nothing where they are all there. Debian 12 has a
 # new enough Vulkan driver in its backports alone, so there the script adds Debian's backports, from which apt
 # takes nothing but what it is asked for, and what that needs.
@@ -10,6 +11,7 @@ set -euo pipefail
 
 readonly sapien_packages=(libx11-6 libgl1 libglib2.0-0)
 readonly opengl_packages=(libegl1 libgl1-mesa-dri)
+readonly browser_packages=(chromium)
 readonly vulkan_packages=(libvulkan1 mesa-vulkan-drivers) oldest_driver=24
 readonly backports_list=${APT_SOURCES:-/etc/apt/sources.list.d}/hcpg-flow-backports.list
 readonly debian_keys=/usr/share/keyrings/debian-archive-keyring.gpg os_release=${OS_RELEASE:-/etc/os-release}
@@ -66,7 +68,8 @@ for purpose in "${purposes[@]}"; do
     sapien) wanted+=("${sapien_packages[@]}") ;;
     opengl) wanted+=("${opengl_packages[@]}") ;;
     vulkan) wanted+=("${vulkan_packages[@]}") ;;
-    *) refuse "there is nothing to install for '$purpose'. Known: sapien, opengl, vulkan." ;;
+    browser) wanted+=("${browser_packages[@]}") ;;
+    *) refuse "there is nothing to install for '$purpose'. Known: sapien, opengl, vulkan, browser." ;;
     esac
 done
 

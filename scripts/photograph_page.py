@@ -8,7 +8,7 @@ import shutil
 from pathlib import Path
 from typing import NamedTuple
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 
 PATIENCE_MS = 10_000
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -31,17 +31,18 @@ VIEWS = (
 )
 
 
-def chromium() -> str:
-    """The path of an installed Chromium.
+def chromium(playwright: Playwright) -> str:
+    """The path of a Chromium: Playwright's own, where it was downloaded, or the system's.
 
     Raises:
         SystemExit: there is none.
     """
-    found = [path for name in NAMES if (path := shutil.which(name))]
+    own = playwright.chromium.executable_path
+    found = [own] if Path(own).exists() else [path for name in NAMES if (path := shutil.which(name))]
     if not found:
         raise SystemExit(
-            "No Chromium is installed (looked for chromium, chromium-browser, google-chrome on PATH). "
-            "Run: scripts/install_system_packages.sh browser"
+            f"No Chromium is installed (looked for {', '.join(NAMES)} on PATH, and for {own}). "
+            "Run: scripts/install_system_packages.sh browser (Debian), or: python -m playwright install chromium"
         )
     return found[0]
 
@@ -71,7 +72,7 @@ def main() -> None:
     asked = parser.parse_args()
     complaints: list[str] = []
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium())
+        browser = playwright.chromium.launch(executable_path=chromium(playwright))
         for view in VIEWS:
             tab = opened(browser, asked.page, view, complaints)
             tab.screenshot(path=asked.folder / f"{view.name}.png", full_page=True)

@@ -130,7 +130,7 @@ def test_sudo_is_used_where_it_is_there(tmp_path):
 
 def test_an_unknown_purpose_and_another_system_are_told(machine):
     told, _ = machine.run("metal")
-    assert told.stderr == "there is nothing to install for 'metal'. Known: sapien, opengl, vulkan.\n"
+    assert told.stderr == "there is nothing to install for 'metal'. Known: sapien, opengl, vulkan, browser.\n"
     (machine.folder / "apt-get").unlink()
     told, _ = machine.run()
     assert told.returncode == 1

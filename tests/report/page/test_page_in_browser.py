@@ -4,6 +4,7 @@ import struct
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from playwright.sync_api import expect, sync_playwright
@@ -15,7 +16,7 @@ MAIN, OVERALL, NUMBERS = (f"#results .table >> nth={place}" for place in range(3
 @pytest.fixture(scope="module")
 def browser(photography):
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=photography["chromium"]())
+        browser = playwright.chromium.launch(executable_path=photography["chromium"](playwright))
         yield browser
         browser.close()
 
@@ -206,5 +207,6 @@ def test_the_script_photographs_every_view(page, tmp_path):
 
 def test_no_browser_is_an_error_that_names_the_package(photography, monkeypatch):
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(SystemExit, match=r"scripts/install_system_packages\.sh browser"):
-        photography["chromium"]()
+    playwright = SimpleNamespace(chromium=SimpleNamespace(executable_path="/nowhere/chrome"))
+    with pytest.raises(SystemExit, match=r"and for /nowhere/chrome.*install_system_packages\.sh browser"):
+        photography["chromium"](playwright)
