@@ -7,6 +7,7 @@ from pathlib import Path
 from PIL import Image
 
 from hcpg.report.figures import learning_curves
+from hcpg.report.paper_figures import write_figures
 from hcpg.report.pictures import save
 from hcpg.report.provenance import provenance
 from hcpg.report.records import load_runs
@@ -37,6 +38,14 @@ def test_the_origin_is_what_the_manifests_and_git_say(write_run):
         "runs' commits": "abcdef0+",
         "runs' commands": "hcpg train --task t",
     }
+
+
+def test_more_tasks_than_a_page_holds_are_left_to_the_page(write_run, tmp_path, caplog):
+    [group] = runs(write_run)
+    many = [group._replace(task=f"point/task-{number}") for number in range(13)]
+    names = {path.name.partition(".")[0] for path in write_figures(many, tmp_path / "out", "c")}
+    assert names == {"progress"}
+    assert "left out the picture curves: a page holds 12 tasks, not 13" in caplog.text
 
 
 def test_every_file_carries_caption_and_origin(write_run, tmp_path):

@@ -46,6 +46,12 @@ def test_a_method_that_lacks_a_task_is_left_out_with_a_notice(write_run, groups,
     assert "left sac out of the progress: it lacks point/carry" in caplog.text
 
 
+def test_nothing_is_drawn_where_every_preset_lacks_a_task(write_run, tmp_path):
+    write_run(preset="sac", task="point/reach", bare=[1, 2])
+    write_run(preset="qsm", task="point/carry", bare=[1, 2])
+    assert progress_figure(load_runs([tmp_path])) is None
+
+
 def test_unlike_seeds_are_refused(write_run, groups, tmp_path):
     write_run(preset="sac_flow", task="point/carry", seed=2, bare=[1, 2])
     with pytest.raises(RecordError, match=r"different seeds \(\[\(0, 1\), \(0, 1, 2\)\]\)"):

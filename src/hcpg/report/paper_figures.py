@@ -1,5 +1,6 @@
 """All figures of a report, each written with its caption and provenance."""
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,6 +9,9 @@ from hcpg.report.ablation import ablated, candidate_table
 from hcpg.report.pictures import save
 from hcpg.report.provenance import provenance
 from hcpg.report.records import Group
+
+MOST_TASKS = 12
+_LOG = logging.getLogger(__name__)
 
 
 def write_figures(groups: Sequence[Group], folder: Path, command: str) -> list[Path]:
@@ -18,14 +22,31 @@ def write_figures(groups: Sequence[Group], folder: Path, command: str) -> list[P
         RecordError: the groups of a suite mix protocols.
         StatisticsError: a run has fewer than five evaluations.
     """
-    origin = provenance(groups, command)
-    written = save(figures.learning_curves(groups), folder / "curves", figures.CAPTION, origin)
+    origin, written = provenance(groups, command), []
+    if _fits("curves", groups):
+        written += save(figures.learning_curves(groups), folder / "curves", figures.CAPTION, origin)
     for suite, own in bars.suites_of(groups).items():
-        caption = bars.CAPTION.format(suite=suite)
-        written += save(bars.success_bars(own), folder / f"bars_{suite}", caption, provenance(own, command))
-    written += save(progress.progress_figure(groups), folder / "progress", progress.CAPTION, origin)
+        caption, name = bars.CAPTION.format(suite=suite), f"bars_{suite}"
+        if _fits(name, own):
+            written += save(bars.success_bars(own), folder / name, caption, provenance(own, command))
+    averaged = progress.progress_figure(groups)
+    if averaged is not None:
+        written += save(averaged, folder / "progress", progress.CAPTION, origin)
     written += _strips(groups, folder, command)
     return written + _ablation(ablated(groups), folder, command)
+
+
+def _fits(name: str, groups: Sequence[Group]) -> bool:
+    """Whether a page can hold a picture with a place for every task; says so where it cannot."""
+    tasks = len({group.task for group in groups})
+    if tasks > MOST_TASKS:
+        _LOG.warning(
+            "left out the picture %s: a page holds %d tasks, not %d. Choose some with --tasks.",
+            name,
+            MOST_TASKS,
+            tasks,
+        )
+    return tasks <= MOST_TASKS
 
 
 def strips_of(groups: Sequence[Group]) -> list[tuple[Group, strips.Strip]]:

@@ -78,17 +78,17 @@ def _profile(groups: Sequence[Group]) -> Profile:
     return Profile(budget, 100 * np.mean(aligned, axis=0))
 
 
-def progress_figure(groups: Sequence[Group]) -> "Figure":
-    """A panel per suite, one column wide for one or two.
+def progress_figure(groups: Sequence[Group]) -> "Figure | None":
+    """A panel per suite, one column wide for one or two; None where no preset has all tasks of any suite.
 
     Raises:
-        RecordError: a preset's tasks have different seeds, or no preset has all tasks of any suite.
+        RecordError: a preset's tasks have different seeds.
         StyleError: more presets than can be told apart.
     """
     suites = {name: profiles(own) for name, own in suites_of(groups).items()}
     suites = {name: own for name, own in suites.items() if own}
     if not suites:
-        raise RecordError("no preset has all tasks of a suite, so there is no progress to average. Run more.")
+        return None
     styles = styles_of(ordered([preset for own in suites.values() for preset in own]))
     with drawing():
         width_in = COLUMN_IN if len(suites) <= COLUMN_PANELS else PAGE_IN

@@ -1,6 +1,5 @@
 """Where a table or picture comes from: the command and code that made it, and the runs that are in it."""
 
-import json
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -39,7 +38,7 @@ def signed(name: str, text: str, origin: Provenance) -> str:
 def provenance(groups: Sequence[Group], command: str) -> Provenance:
     """What the runs of `groups` were made from, and the code at hand; where runs differ, all is listed."""
     runs = [run for group in groups for run in group.runs]
-    manifests = [json.loads((run.path / "manifest.json").read_text()) for run in runs]
+    manifests = [run.manifest for run in runs]
     steps = {curve.steps[-1] for run in runs for curve in run.curves.values() if curve.steps.size}
     episodes = {int(count) for run in runs for curve in run.curves.values() for count in curve.episodes}
     facts = {
