@@ -19,8 +19,10 @@ from hcpg.loops.control.records import EpisodeResult
 from hcpg.loops.control.sessions import Session
 from hcpg.loops.control.step_log import plain
 from hcpg.loops.control.watching import Watched, watch
+from hcpg.loops.control.workers import passes_by_itself
 from hcpg.registry import UnknownNameError
 from hcpg.robot_types import Limits
+from hcpg.safety.priority import raise_priority
 from hcpg.selection import RULES, Selector
 
 STEPS = "steps.jsonl"
@@ -91,6 +93,8 @@ def _announced(options: argparse.Namespace) -> Rig:
     rig = plugin.make(options.task, options.address)
     sys.stdout.write(f"{options.robot} ({plugin.kind}), {options.task}; limits:\n")
     sys.stdout.writelines(f"  {line}\n" for line in _limit_lines(rig.robot.limits))
+    refused = raise_priority() if passes_by_itself(rig.robot.clock) else ""
+    sys.stdout.write(f"{refused}\n" if refused else "")
     return rig
 
 

@@ -1,6 +1,7 @@
 """An arm that is a point: no simulator, no network, on a clock of its own that jumps instead of waiting.
 
-The TCP follows its target with a lag of 40 ms. What holds for every robot can be tried on it in no time.
+The TCP follows its target with a lag of 40 ms. What holds for every robot can be tried on it in no time; on
+the machine's own clock it shows how well the loop keeps its deadlines there.
 """
 
 import math
@@ -8,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hcpg.interfaces import Rig
+from hcpg.interfaces import Clock, Rig
 from hcpg.perception.truth import NoisyTruth, Poorness
 from hcpg.robot_types import (
     Ack,
@@ -23,6 +24,7 @@ from hcpg.robot_types import (
     RobotError,
     Snapshot,
 )
+from hcpg.safety.clock import MachineClock
 from hcpg.safety.gate import Gate
 from hcpg.types import Float
 
@@ -34,6 +36,7 @@ LAG_S = 0.04
 GRIPPER_SPEED_M_S = 0.1
 OPEN_M = 0.08
 STATE_PERIOD_S = 0.001
+REAL_TIME = "real-time"
 
 
 class JumpingClock:
@@ -54,13 +57,14 @@ class JumpingClock:
 class PointArm:
     """The arm; its state is worked out when somebody looks."""
 
-    def __init__(self) -> None:
-        self.limits, self.clock = LIMITS, JumpingClock()
+    def __init__(self, clock: Clock | None = None) -> None:
+        """On a clock that jumps, unless another is given."""
+        self.limits, self.clock = LIMITS, clock or JumpingClock()
         self._gate = Gate(LIMITS)
         self._position, self._velocity = np.array([0.0, 0.0, 0.2]), np.zeros(3)
         self._target = self._position
         self._width_m, self._width_target_m = OPEN_M, OPEN_M
-        self._moved_s, self._holds, self._connected = 0.0, True, False
+        self._moved_s, self._holds, self._connected = self.clock.now_s(), True, False
 
     def connect(self, timeout_s: float) -> Info:
         """Always succeeds."""
@@ -171,15 +175,18 @@ class PointRobot:
     kind: Kind = "twin"
 
     def make(self, task: str, address: str | None) -> Rig:
-        """The arm, with one object and one goal in sight.
+        """The arm, with one object and one goal in sight; at `real-time` it lives on this machine's clock.
 
         Raises:
-            RobotError: the task is none of the suite `point`.
+            RobotError: the task is none of the suite `point`, or the address is another.
         """
         if not task.startswith("point/"):
             raise RobotError(f"the point arm cannot do {task}; give it a task of the suite point")
+        if address not in (None, REAL_TIME):
+            raise RobotError(f"the point arm has no address {address!r}; give {REAL_TIME!r}, or none")
         stage = PointStage()
-        return Rig(PointArm(), NoisyTruth(lambda: stage.places, Poorness(dropouts=0.0), seed=0), stage)
+        arm = PointArm(None if address is None else MachineClock())
+        return Rig(arm, NoisyTruth(lambda: stage.places, Poorness(dropouts=0.0), seed=0), stage)
 
 
 ROBOT = PointRobot()

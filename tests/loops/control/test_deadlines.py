@@ -24,6 +24,14 @@ def test_deadlines_are_absolute():
     assert deadlines.timing() == Timing(5, 0, 0, 0, 0.0, 0.0, 0.0)
 
 
+def test_the_first_tick_is_never_missed():
+    clock = JumpingClock()
+    deadlines = Deadlines(clock, 10.0)
+    clock.sleep_until(7.3)  # set-up that takes its time
+    assert deadlines.wait() == (0, 7.3, 7.3, 0)
+    assert deadlines.wait().due_s == pytest.approx(7.4)
+
+
 def test_a_missed_deadline_is_skipped_never_made_up_for():
     clock = JumpingClock()
     deadlines = Deadlines(clock, 10.0)

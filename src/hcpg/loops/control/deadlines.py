@@ -48,11 +48,14 @@ class Timing(NamedTuple):
 
 
 class Deadlines:
-    """Tick n is due at t0 + n / rate, whatever happened before. A missed tick is never made up for."""
+    """Tick n is due at t0 + n / rate, whatever happened before. A missed tick is never made up for.
+
+    The first wait sets t0 and returns at once.
+    """
 
     def __init__(self, clock: Clock, rate_hz: float) -> None:
         self._clock, self._period_s = clock, 1.0 / rate_hz
-        self._start_s = clock.now_s()
+        self._start_s: float | None = None
         self._next = 0
         self._lateness_s: list[float] = []
         self._skipped, self._overruns, self._longest_gap = 0, 0, 0
@@ -61,8 +64,10 @@ class Deadlines:
         """Sleep until the next deadline that has not passed, and give its tick."""
         planned = self._next
         now_s = self._clock.now_s()
+        if self._start_s is None:
+            self._start_s = now_s
         number = max(planned, math.ceil((now_s - self._start_s - _SAME_S) / self._period_s))
-        due_s = self.due_s(number)
+        due_s = self._start_s + number * self._period_s
         self._clock.sleep_until(due_s)
         woke_s = self._clock.now_s()
         self._lateness_s.append(max(woke_s - due_s, 0.0))
@@ -70,11 +75,7 @@ class Deadlines:
         number = max(number, math.floor((woke_s - self._start_s + _SAME_S) / self._period_s))
         self._count(number - planned)
         self._next = number + 1
-        return Tick(number, self.due_s(number), woke_s, number - planned)
-
-    def due_s(self, number: int) -> float:
-        """When tick `number` is due."""
-        return self._start_s + number * self._period_s
+        return Tick(number, self._start_s + number * self._period_s, woke_s, number - planned)
 
     def timing(self) -> Timing:
         """What was counted so far; the lateness is NaN before the first tick."""

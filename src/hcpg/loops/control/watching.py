@@ -59,7 +59,7 @@ def _held(robot: Robot, info: Info, seconds: float) -> Watched:
         snapshot = robot.observe()
         robot.hold()
         modes[snapshot.mode] = None
-        ages.append(freshness.age_s(snapshot, tick.woke_s))
+        ages.append(freshness.age_s(snapshot, clock.now_s()))
         rates.append(snapshot.success_rate)
         moved = max(moved, float(np.linalg.norm(snapshot.position - first.position)))
         bodies.append(clock.now_s() - tick.woke_s)
