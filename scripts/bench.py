@@ -179,6 +179,17 @@ def _proportional_bytes(pid: int) -> float:
     return total
 
 
+def report() -> list[tuple[str, float, str]]:
+    """Reading, summing up and writing the page of 10,000 runs, just generated."""
+    answer = _one("report_scale")
+    print(f"  {answer['runs']:,} runs, {answer['episodes_gib']:.2f} GiB of episodes;", end=" ")
+    print(f"{answer['processor_seconds']:.1f} s of one core, page {answer['page_mib']:.1f} MiB")
+    return [
+        ("hcpg report on 10,000 runs, s", answer["seconds"], "< 20"),
+        ("memory of it at its peak, GiB", answer["peak_gib"], "< 1"),
+    ]
+
+
 def _one(module: str) -> Any:
     command = [sys.executable, "-m", f"benchmarks.{module}"]
     answer = subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, check=True, capture_output=True, text=True)

@@ -42,7 +42,7 @@ def chromium(playwright: Playwright) -> str:
     if not found:
         raise SystemExit(
             f"No Chromium is installed (looked for {', '.join(NAMES)} on PATH, and for {own}). "
-            "Run: scripts/install_system_packages.sh browser (Debian), or: python -m playwright install chromium"
+            "Run: scripts/install_system_packages.sh browser, or: python -m playwright install chromium"
         )
     return found[0]
 

@@ -1,8 +1,9 @@
 """Evaluation episodes as arrays, straight from the bytes of `episodes.jsonl`.
 
-A report may read thousands of these files. A line as the loops write it is a head, which says what was
-evaluated and recurs from file to file, and a tail, which says how it went. One expression cuts the file into
-both, and every head is taken apart once only. Any other line goes through a JSON parser, and says the same.
+A report may read thousands of these files. A line as the loops write it is a head (step, phase, selector,
+adapter, environment), which recurs from file to file, and a tail (start state, success, and more). One
+expression cuts a file into both, and every head is taken apart once only. Any other line goes through a JSON
+parser, and says the same.
 """
 
 import re
@@ -20,11 +21,12 @@ _TEXT = rb'"([ !#-\[\]-~]*+)"'
 """A string without escapes."""
 _HEAD = re.compile(
     rb'\{"step": (' + _INTEGER + rb'), "phase": ' + _TEXT + rb', "selector": ' + _TEXT + rb', "adapter": '
-    rb"" + _TEXT + rb', "environment": ' + _INTEGER + rb', "start": (' + _INTEGER + rb"), "
+    rb"" + _TEXT + rb', "environment": ' + _INTEGER + rb", "
 )
 _TAIL = re.compile(
-    rb'"success_once": (true|false), "success_at_end": (?:true|false), "steps_to_success": '
-    rb"" + _INTEGER + rb', "return": (?:' + _NUMBER + rb'|null), "length": ' + _INTEGER + rb"\}\n"
+    rb'"start": (' + _INTEGER + rb'), "success_once": (true|false), "success_at_end": (?:true|false), '
+    rb'"steps_to_success": ' + _INTEGER + rb', "return": (?:' + _NUMBER + rb'|null), "length": '
+    rb"" + _INTEGER + rb"\}\n"
 )
 _EVALUATION = (
     '{{"step": {step}, "phase": "evaluation", "selector": "{selector}", "adapter": "{adapter}", '
@@ -33,8 +35,7 @@ _EVALUATION = (
 )
 """What is read of a line, in the form in which the loops write it."""
 _TYPES = {"selector": str, "adapter": str, "start": int, "success_once": bool}
-_OF_TRAINING = -1
-_MALFORMED = -2
+_MALFORMED = -1
 
 
 class Episodes(NamedTuple):
@@ -61,21 +62,20 @@ class _Heads(dict[bytes, int]):
         super().__init__()
         self.selectors: list[str] = []
         self.adapters: list[str] = []
-        self.numbers = np.zeros((0, 4), np.int64)
-        """By head: step, start, place of its selector and of its adapter."""
+        self.facts = np.zeros((0, 3), np.int64)
+        """By head: step, place of its selector and of its adapter; -1 each if it is of training."""
 
     def __missing__(self, head: bytes) -> int:
         found = _HEAD.fullmatch(head)
         if found is None:
             return _MALFORMED
-        step, phase, selector, adapter, start = found.groups()
-        if phase != b"evaluation":
-            return _OF_TRAINING  # its start state was drawn, so it hardly recurs
+        step, phase, selector, adapter = found.groups()
         number = self[head] = len(self)
-        if number == len(self.numbers):
-            self.numbers = np.concatenate([self.numbers, np.zeros((1 + number, 4), np.int64)])
-        names = (_place(self.selectors, selector.decode()), _place(self.adapters, adapter.decode()))
-        self.numbers[number] = (int(step), int(start), *names)
+        if number == len(self.facts):
+            self.facts = np.concatenate([self.facts, np.full((1 + number, 3), -1)])
+        if phase == b"evaluation":
+            names = (_place(self.selectors, selector.decode()), _place(self.adapters, adapter.decode()))
+            self.facts[number] = (int(step), *names)
         return number
 
 
@@ -98,27 +98,35 @@ def read_evaluations(path: Path) -> Evaluations:
         RowError: a line is damaged or lacks a field; the message has the file and the line number.
     """
     content = complete_lines(path)
-    numbers, successes = _cut(content)
-    if _MALFORMED in numbers:
-        numbers, successes = _cut(_rewritten(path, content))
-    chosen = numbers >= 0
-    facts, successes = _HEADS.numbers[numbers[chosen]], successes[chosen]
+    cut = _cut(content)
+    if _MALFORMED in cut.heads:
+        cut = _cut(_rewritten(path, content))
+    steps, selectors, adapters = _HEADS.facts[cut.heads].T
     by_selector = {}
-    for selector in dict.fromkeys(facts[:, 2].tolist()):
-        own = facts[:, 2] == selector
-        steps, starts = facts[own, 0], facts[own, 1]
-        order = np.lexsort((starts, steps))
-        by_selector[_HEADS.selectors[selector]] = Episodes(steps[order], starts[order], successes[own][order])
-    adapters = frozenset(_HEADS.adapters[place] for place in set(facts[:, 3].tolist()))
-    return Evaluations(adapters, by_selector)
+    for selector in dict.fromkeys(selectors[selectors >= 0].tolist()):
+        own = selectors == selector
+        order = np.lexsort((cut.starts[own], steps[own]))
+        rows = (column[own][order] for column in (steps, cut.starts, cut.successes))
+        by_selector[_HEADS.selectors[selector]] = Episodes(*rows)
+    names = frozenset(_HEADS.adapters[place] for place in set(adapters[adapters >= 0].tolist()))
+    return Evaluations(names, by_selector)
 
 
-def _cut(content: bytes) -> tuple[Int[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
-    """Of every line the number of its head, and whether it was a success."""
+class _Cut(NamedTuple):
+    """Lines taken apart."""
+
+    heads: Int[np.ndarray, " N"]
+    """Numbers in `_HEADS`; -1 for a line that is not as the loops write it."""
+    starts: Int[np.ndarray, " N"]
+    successes: Bool[np.ndarray, " N"]
+
+
+def _cut(content: bytes) -> _Cut:
     *parts, rest = _TAIL.split(content)
-    heads = [*parts[::2], rest] if rest else parts[::2]
-    numbers = np.fromiter(map(_HEADS.__getitem__, heads), np.int64, len(heads))
-    return numbers, np.array([each == b"true" for each in parts[1::2]] + [False] * bool(rest), bool)
+    heads = np.fromiter(map(_HEADS.__getitem__, parts[::3]), np.int64, len(parts) // 3)
+    starts = np.array([int(start) for start in parts[1::3]], np.int64)
+    successes = np.array([success == b"true" for success in parts[2::3]], bool)
+    return _Cut(np.append(heads, _MALFORMED) if rest else heads, starts, successes)
 
 
 def _rewritten(path: Path, content: bytes) -> bytes:
@@ -140,6 +148,6 @@ def _line(path: Path, number: int, row: Row) -> str:
                 "Restore the file, or delete that line."
             )
     line = _EVALUATION.format(**{**row, "success_once": str(row["success_once"]).lower()})
-    if _MALFORMED in _cut(line.encode())[0]:
+    if _MALFORMED in _cut(line.encode()).heads:
         raise RowError(f"{path}, line {number}: {row['selector']!r} or {row['adapter']!r} is no plain name.")
     return line

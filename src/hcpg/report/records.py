@@ -170,10 +170,10 @@ def json_object(path: Path) -> dict[str, Any]:
     Raises:
         RecordError: the file is missing, or is no JSON object.
     """
-    if not path.is_file():
-        raise RecordError(f"there is no {path}. Restore it, or remove the rest of that run.")
     try:
         found = _parsed(path.read_text())
+    except FileNotFoundError as error:
+        raise RecordError(f"there is no {path}. Restore it, or remove the rest of that run.") from error
     except ValueError as error:
         raise RecordError(f"{path} is damaged ({error}). Restore it.") from error
     if not isinstance(found, dict):

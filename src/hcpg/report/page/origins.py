@@ -1,6 +1,7 @@
 """Where the numbers come from: what the methods' settings differ in, and what the runs' manifests say."""
 
 import json
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -56,7 +57,7 @@ def manifest(groups: Sequence[Group], root: Path) -> dict[str, Any]:
             seen.setdefault(key, Counter())[_plain(value)] += count
     alike = {key: next(iter(counts)) for key, counts in seen.items() if [*counts.values()] == [len(runs)]}
     differing = {key: _listed(counts, len(runs)) for key, counts in seen.items() if key not in alike}
-    return {"alike": alike, "differing": differing, "runs": [_row(run, root.resolve()) for run in runs]}
+    return {"alike": alike, "differing": differing, "runs": [_row(run, root) for run in runs]}
 
 
 def _plain(value: str) -> str:
@@ -80,7 +81,7 @@ def _runs(count: int) -> str:
 
 
 def _row(run: Record, root: Path) -> dict[str, Any]:
-    folder = run.path.resolve()
+    folder = os.path.relpath(run.path, root)
     return {
         "task": run.task,
         "preset": run.preset,
@@ -89,5 +90,5 @@ def _row(run: Record, root: Path) -> dict[str, Any]:
         "step": run.status.get("step"),
         "commit": commit_text(run.manifest.get("code", {})),
         "time": run.manifest.get("time"),
-        "folder": str(folder.relative_to(root) if folder.is_relative_to(root) else folder.name),
+        "folder": run.path.name if folder.startswith(os.pardir) else folder,
     }
