@@ -118,6 +118,7 @@ class Command(NamedTuple):
     position: Float[Tensor, " 3"]
     """Where the TCP shall be, m. The orientation is the robot's fixed nominal one."""
     grip: Grip
+    """Said at every tick; the same word again changes nothing."""
 
 
 class Ack(NamedTuple):

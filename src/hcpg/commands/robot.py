@@ -41,7 +41,7 @@ def _check(options: argparse.Namespace) -> int:
     sys.stdout.writelines(f"{line}\n" for line in _watched_lines(seen, options.seconds))
     if options.out is not None:
         options.out.write_text(json.dumps(plain(seen), indent=2) + "\n")
-    return int(not seen.sound)
+    return int(not seen.sound) if seen.signal is None else 128 + seen.signal
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -67,13 +67,18 @@ def _drill(options: argparse.Namespace) -> int:
     for name in names:
         if name not in FAULTS:
             raise UnknownNameError("fault", name, list(FAULTS))
-    outcomes = {}
+    outcomes: dict[str, Outcome] = {}
     for name in names:
-        outcomes[name] = _drilled(options, name)
-        sys.stdout.write(f"{drill_table.line(name, outcomes[name])}\n")
-    kind = registry.robot(options.robot).kind
+        outcome = _drilled(options, name)
+        if outcome.signal is not None:
+            return 128 + outcome.signal
+        outcomes[name] = outcome
+        sys.stdout.write(f"{drill_table.line(name, outcome)}\n")
     (options.out / "outcomes.json").write_text(json.dumps(plain(outcomes), indent=2) + "\n")
-    (options.out / "table.md").write_text(drill_table.table(options.robot, kind, outcomes))
+    table = drill_table.table(options.robot, options.task, outcomes)
+    (options.out / "table.md").write_text(table)
+    if options.into is not None:
+        options.into.write_text(drill_table.inserted(options.into.read_text(), options.robot, table))
     return int(not all(map(drill_table.harmless, outcomes.values())))
 
 
@@ -147,6 +152,7 @@ def _parser() -> argparse.ArgumentParser:
     faults = _action(actions, "drill", _drill, "inject faults into a twin and tell what happened")
     faults.add_argument("--fault", nargs="*", help=f"some of: {', '.join(FAULTS)}; default: all")
     faults.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new folder")
+    faults.add_argument("--into", type=Path, metavar="FILE", help="a document with a place for the table")
     return parser
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from point_rig import ROBOT_TASK, TASK, new_rig
 
+from hcpg.loops.control import drill_table
 from hcpg.loops.control.drill import FIRST_TICK, DrillError, drill
 from hcpg.loops.control.drill_list import FAULTS
 
@@ -161,7 +162,17 @@ def test_the_table_has_a_line_per_fault(folder):
     lines = (folder / "table.md").read_text().splitlines()
     named = [line.split("|")[1].strip(" `") for line in lines[2 : 2 + len(FAULTS)]]
     assert named == list(FAULTS)
-    assert lines[-1] == f"{len(FAULTS)} of {len(FAULTS)} harmless, on the robot `point` (twin)."
+    told = f"{len(FAULTS)} of {len(FAULTS)} harmless: `hcpg robot drill point/reach --robot point`."
+    assert lines[-1] == told
+
+
+def test_the_table_goes_into_its_place_and_nowhere_else():
+    document = "a\n<!-- drill point -->\nold\n<!-- end -->\nb\n<!-- drill arm -->\n<!-- end -->\n"
+    assert drill_table.inserted(document, "point", "new\n") == (
+        "a\n<!-- drill point -->\n\nnew\n\n<!-- end -->\nb\n<!-- drill arm -->\n<!-- end -->\n"
+    )
+    with pytest.raises(DrillError, match="no place"):
+        drill_table.inserted(document, "other", "new\n")
 
 
 def test_a_real_arm_is_not_drilled(tmp_path):

@@ -1,3 +1,5 @@
+import signal
+
 import numpy as np
 import pytest
 from point_rig import Scripted, new_rig
@@ -62,3 +64,18 @@ def test_a_robot_that_does_not_answer_is_let_go_too():
     with pytest.raises(RobotError, match="nobody answers"):
         watch(robot, 1.0)
     assert robot.observe().mode == "disconnected"
+
+
+def test_a_signal_ends_it_with_the_arm_stopped():
+    arm = new_rig().robot
+    observe, looks = arm.observe, []
+
+    def interrupted():
+        looks.append(None)
+        if len(looks) == 5:
+            signal.raise_signal(signal.SIGTERM)
+        return observe()
+
+    arm.observe = interrupted
+    seen = watch(arm, 1000.0)
+    assert (seen.signal, seen.sound, seen.timing.ticks) == (signal.SIGTERM, False, 4)

@@ -153,6 +153,8 @@ class Outcome(NamedTuple):
     """Steps in the log; each tick has to be there."""
     cost_s: float
     """From the fault to the beginning of the next episode; NaN if there was none."""
+    signal: int | None
+    """The signal that ended the drill, if one did."""
 
 
 def drill(
@@ -203,6 +205,7 @@ def _outcome(fault: Fault, site: Site, session: SessionResult, log: Path) -> Out
         ticks=sum(len(each.records) for each in episodes),
         logged=len(_logged_ticks(log)),
         cost_s=episodes[1].records[0].tick.woke_s - begin_s if len(episodes) > 1 else float("nan"),
+        signal=session.signal,
     )
 
 

@@ -3,8 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from hcpg.loops.control.drill import Outcome
-from hcpg.robot_types import Kind
+from hcpg.loops.control.drill import DrillError, Outcome
 
 FURTHEST_OUTSIDE_MM = 20.0
 """An impedance lets the arm overshoot a target on the box's wall; a target is never outside."""
@@ -37,13 +36,27 @@ def line(name: str, outcome: Outcome) -> str:
     return f"{mark:4}  {name:26}  {', '.join(outcome.endings)} ({outcome.cause}){ended}"
 
 
-def table(robot: str, kind: Kind, outcomes: Mapping[str, Outcome]) -> str:
-    """All outcomes in Markdown, with what they were made on."""
+def table(robot: str, task: str, outcomes: Mapping[str, Outcome]) -> str:
+    """All outcomes in Markdown, with the command that makes them."""
     head = [_line(COLUMNS), _line(["---"] * len(COLUMNS))]
     rows = [_line(_cells(name, outcome)) for name, outcome in outcomes.items()]
     count = sum(map(harmless, outcomes.values()))
-    total = f"\n{count} of {len(outcomes)} harmless, on the robot `{robot}` ({kind}).\n"
+    total = f"\n{count} of {len(outcomes)} harmless: `hcpg robot drill {task} --robot {robot}`.\n"
     return "".join([*head, *rows, total])
+
+
+def inserted(document: str, robot: str, table: str) -> str:
+    """The document with `table` in the place that two comments mark for the robot.
+
+    Raises:
+        DrillError: the document has no such place.
+    """
+    begin, end = f"<!-- drill {robot} -->\n", "<!-- end -->\n"
+    before, found, rest = document.partition(begin)
+    _, ended, after = rest.partition(end)
+    if not found or not ended:
+        raise DrillError(f"the document has no place for the table; give it the lines {begin!r} and {end!r}")
+    return f"{before}{begin}\n{table}\n{end}{after}"
 
 
 def _line(cells: Sequence[str]) -> str:

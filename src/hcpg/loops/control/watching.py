@@ -7,6 +7,7 @@ import numpy as np
 from hcpg.interfaces import Robot
 from hcpg.loops.control.deadlines import Deadlines, Timing
 from hcpg.loops.control.states import Freshness
+from hcpg.loops.control.stopping import StopButton
 from hcpg.robot_types import Info, Mode
 from hcpg.safety.limiting import outside_m
 
@@ -26,45 +27,55 @@ class Watched(NamedTuple):
     """The furthest from where it was at first."""
     outside_mm: float
     """Of the box, at the first look."""
+    signal: int | None
+    """The signal that ended it early, if one did."""
 
     @property
     def sound(self) -> bool:
         """Whether every check passed, the arm is inside its box and held, and deadlines were kept."""
         passed = all(check.passed for check in self.info.checks)
-        return passed and self.outside_mm == 0.0 and set(self.modes) <= {"idle", "move"} and self.timing.sound
+        still = self.outside_mm == 0.0 and set(self.modes) <= {"idle", "move"}
+        return passed and still and self.timing.sound and self.signal is None
 
 
 def watch(robot: Robot, seconds: float, connect_s: float = 10.0) -> Watched:
-    """Connect, hold for `seconds`, and let go.
+    """Connect, hold for `seconds` or until a signal comes, and let go.
 
     Raises:
         RobotError: it cannot be connected; the message says the cure.
     """
     try:
-        info = robot.connect(connect_s)
-        return _held(robot, info, seconds)
+        with StopButton(robot) as button:
+            info = robot.connect(connect_s)
+            return _held(robot, info, seconds, button)
     finally:
         robot.stop("the check ends")
         robot.close()
 
 
-def _held(robot: Robot, info: Info, seconds: float) -> Watched:
+def _held(robot: Robot, info: Info, seconds: float, button: StopButton) -> Watched:
     deadlines, freshness, clock = Deadlines(robot.clock, robot.limits.rate_hz), Freshness(), robot.clock
     first = robot.observe()
-    ages, bodies, rates, moved = [], [], [], 0.0
+    ages, bodies, rates, moved = [0.0], [0.0], [1.0], [0.0]
     modes: dict[Mode, None] = {}
     end_s = clock.now_s() + seconds
-    while clock.now_s() < end_s:
+    while clock.now_s() < end_s and not button.reason:
         tick = deadlines.wait()
         snapshot = robot.observe()
         robot.hold()
         modes[snapshot.mode] = None
         ages.append(freshness.age_s(snapshot, clock.now_s()))
         rates.append(snapshot.success_rate)
-        moved = max(moved, float(np.linalg.norm(snapshot.position - first.position)))
+        moved.append(float(np.linalg.norm(snapshot.position - first.position)))
         bodies.append(clock.now_s() - tick.woke_s)
-    outside_mm = 1000 * outside_m(first.position, robot.limits)
-    slowest, oldest = 1000 * max(bodies), 1000 * max(ages)
     return Watched(
-        info, deadlines.timing(), oldest, slowest, min(rates), tuple(modes), 1000 * moved, outside_mm
+        info=info,
+        timing=deadlines.timing(),
+        state_age_max_ms=1000 * max(ages),
+        body_max_ms=1000 * max(bodies),
+        success_rate_min=min(rates),
+        modes=tuple(modes),
+        moved_mm=1000 * max(moved),
+        outside_mm=1000 * outside_m(first.position, robot.limits),
+        signal=button.signal,
     )
