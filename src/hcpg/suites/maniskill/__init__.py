@@ -1,8 +1,9 @@
 """ManiSkill: tasks of a Panda arm in SAPIEN (PhysX), with state observations and end-effector control.
 
-Three traps of the package end here. An unseeded reset draws from PyTorch's global generator, so every reset
-has a seed. The flag `is_grasped` survives a reset, so the first observation says 0. A success ends an
-episode, which would make it worth less than being close to one, so nothing here ever terminates.
+Traps of the package that end here. An unseeded reset draws from PyTorch's global generator, so every reset
+has a seed. A reset leaves the last episode's contacts in the physics engine, so every episode gets an engine
+of its own: without it the flag `is_grasped` is wrong at first, and an episode depends on the one before. A
+success ends an episode, which would make it worth less than being close to one, so nothing terminates here.
 """
 
 import difflib
@@ -13,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from hcpg.interfaces import Environment, Task
-from hcpg.suites.maniskill.building import build_simulation
+from hcpg.suites.maniskill.building import build_simulation, renew_physics
 from hcpg.suites.maniskill.numpy_stepping import NumpyStepping
 from hcpg.suites.maniskill.pictures import Camera
 from hcpg.suites.maniskill.stepping import Stepping, TorchStepping
@@ -22,8 +23,6 @@ from hcpg.types import Float, Spec, Step, UInt8
 OBSERVATION_SIZES = {"PickCube-v1": 42, "PushCube-v1": 35, "PullCube-v1": 35, "PokeCube-v1": 54}
 ACTION_SIZES = {"pd_ee_delta_pos": 4, "pd_ee_delta_pose": 7}
 """By control mode; the last number is the gripper's: 1 opens, -1 closes."""
-IS_GRASPED = {"PickCube-v1": 18}
-"""Where an observation holds the flag that survives a reset."""
 START_STATES = 4096
 """Start states of one seed. ManiSkill's own seeds have 32 bits, and sets of different seeds are disjoint."""
 LARGEST_SEED = 2**32 // START_STATES - 1
@@ -36,14 +35,11 @@ class ManiskillEnvironment:
         self._task, self._seed, self._stepping = task, seed, stepping
         self._camera: Camera | None = None
         self._action_size = ACTION_SIZES[control_mode(task)]
-        self._is_grasped = IS_GRASPED.get(task.env_id)
 
     def reset(self, start: int) -> Float[np.ndarray, " O"]:
-        """The first observation of start state `start % 4096`."""
-        observation = self._stepping.reset(self._seed * START_STATES + start % START_STATES)
-        if self._is_grasped is not None:
-            observation[self._is_grasped] = 0.0
-        return observation
+        """The first observation of start state `start % 4096`; of what was before, nothing is left."""
+        renew_physics(self._stepping.simulation)
+        return self._stepping.reset(self._seed * START_STATES + start % START_STATES)
 
     def step(self, action: Float[np.ndarray, " A"]) -> Step:
         """The answer to one action; success means "now", and the episode goes on after it.

@@ -36,6 +36,25 @@ def build_stage(env_id: str, control_mode: str) -> Any:
     return _build(env_id, control_mode, nullcontext(), **_DRAWING)
 
 
+def renew_physics(simulation: Any) -> None:
+    """Put all bodies of a simulation that draws nothing into a new scene of the physics engine.
+
+    A reset by ManiSkill moves the bodies back into the old one, where the order in which contacts are solved
+    follows from the last episode: once bodies touch, the same start and actions then lead elsewhere.
+    """
+    sapien: Any = importlib.import_module("sapien")
+    scene, old = simulation.scene, simulation.scene.sub_scenes[0]
+    simulation._set_scene_config()  # the engine's own settings are global, and read when a scene is made
+    physics = sapien.physx.PhysxCpuSystem()
+    physics.timestep = scene.px.timestep
+    entities, new = list(old.entities), sapien.Scene([physics])
+    for entity in entities:
+        old.remove_entity(entity)
+    for entity in entities:
+        new.add_entity(entity)
+    scene.sub_scenes[0], scene.px = new, physics
+
+
 def _build(env_id: str, control_mode: str, building: AbstractContextManager, **rendering: Any) -> Any:
     with warnings.catch_warnings(), _only_errors_logged():
         warnings.simplefilter("ignore")  # of the package's own use of logging, NumPy and the Vulkan loader

@@ -14,7 +14,7 @@ class RenderingError(RuntimeError):
     def __init__(self, cause: object) -> None:
         super().__init__(
             f"cannot draw with Vulkan: {cause}. Without a GPU it takes Mesa 24 or newer: run "
-            "scripts/install_system_packages.sh (Debian, Ubuntu); `hcpg doctor` says what is there. "
+            "scripts/install_system_packages.sh vulkan (Debian, Ubuntu); `hcpg doctor` says what is there. "
             "Training needs no Vulkan."
         )
 

@@ -48,7 +48,7 @@ class NumpyStepping:
         require_versions()
         self.simulation = simulation
         self._control, self._task = EndEffectorControl(simulation), TASKS[env_id](simulation)
-        self._physics, self._substeps = simulation.scene.px, simulation._sim_steps_per_control
+        self._scene, self._substeps = simulation.scene, simulation._sim_steps_per_control
 
     def reset(self, seed: int) -> Float[np.ndarray, " O"]:
         """The first observation; ManiSkill itself resets."""
@@ -57,8 +57,9 @@ class NumpyStepping:
     def step(self, action: Float[np.ndarray, " A"]) -> tuple[Float[np.ndarray, " O"], float, bool]:
         """Observation, normalised dense reward and success."""
         self._control.set_targets(action)
+        physics = self._scene.px  # another one after each reset
         for _ in range(self._substeps):
-            self._physics.step()
+            physics.step()
         return self._task.answer()
 
     def close(self) -> None:

@@ -44,7 +44,7 @@ class Arm:
         agent = simulation.agent
         self._articulation, self._tcp = agent.robot._objs[0], agent.tcp._objs[0]
         self._fingers = [(agent.finger1_link._objs[0], 1.0), (agent.finger2_link._objs[0], -1.0)]
-        self._physics, self._timestep_s = simulation.scene.px, simulation.scene.px.timestep
+        self._scene, self._timestep_s = simulation.scene, simulation.scene.px.timestep
 
     def posture(self) -> Posture:
         """Joints and tool point as they are now."""
@@ -53,7 +53,7 @@ class Arm:
 
     def grasps(self, body: Any) -> bool:
         """Whether both fingers press the body from inside; `body` is one of SAPIEN's."""
-        contacts = [contact for contact in self._physics.get_contacts() if body in contact.bodies]
+        contacts = [contact for contact in self._scene.px.get_contacts() if body in contact.bodies]
         return bool(contacts) and all(self._presses(*finger, body, contacts) for finger in self._fingers)
 
     def _presses(self, finger: Any, side: float, body: Any, contacts: list[Any]) -> bool:
