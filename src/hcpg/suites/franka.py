@@ -91,7 +91,7 @@ class FrankaEnvironment:
         return Motion(self._target, TICK_S, self._running_s)
 
     def _carry_out(self, limited: Limited) -> None:
-        self._world.physics.target = limited.position
+        self._world.physics.aim(limited.position)
         if limited.grip != "keep":
             self._world.physics.grip = limited.grip
         self._target = limited.position

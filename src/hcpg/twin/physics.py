@@ -16,6 +16,9 @@ TICK_S = 1.0 / 30.0
 TIMESTEP_S = TICK_S / STEPS_PER_TICK
 """About 2 ms: half the cost of the controller's own 1 ms, and a whole number of steps per tick."""
 
+LATENCY_STEPS = 2
+"""From the state that a command answers to its arrival, in steps: 4 ms, as over the served twin's driver."""
+
 
 class Physics:
     """A scene that steps only when it is told to."""
@@ -30,6 +33,7 @@ class Physics:
         self._impedance = Impedance(gains or Gains(), np.diag([1.0, -1.0, -1.0]), start)
         self.steps = 0
         self.target = np.array(scene.home)
+        self._coming: tuple[int, Float[np.ndarray, " 3"]] | None = None
         self.grip: Grip = scene.home_grip
 
     def lay_out(self, layout: Layout) -> None:
@@ -41,15 +45,25 @@ class Physics:
         self.data.qpos[self.at.fingers] = self._finger_target()
         self.refresh()
         self._impedance.relax()
-        self.target = self.position
+        self.stay()
 
     def refresh(self) -> None:
         """Work out all positions anew, after something was put elsewhere."""
         self._mujoco.mj_forward(self.model, self.data)
 
+    def aim(self, target: Float[np.ndarray, " 3"]) -> None:
+        """Let the target be there, m, as soon as a command takes to arrive."""
+        self._coming = (self.steps + LATENCY_STEPS, target)
+
+    def stay(self) -> None:
+        """Let the target be where the TCP is, at once."""
+        self._coming, self.target = None, self.position
+
     def step(self) -> None:
         """One time step: forces from where everything is now, then motion."""
         data, at = self.data, self.at
+        if self._coming is not None and self.steps >= self._coming[0]:
+            self.target, self._coming = self._coming[1], None
         self._mujoco.mj_step1(self.model, data)
         data.qfrc_applied[at.arm_speeds] = self._impedance.torques(self._readings(), self.target, TIMESTEP_S)
         data.qfrc_applied[at.finger_speeds] = finger_forces(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hcpg.robot_types import Ack, Command, Grip, Info, Limits, Recovery, RobotError, Snapshot
+from hcpg.robot_types import Ack, Check, Command, Grip, Info, Limits, Recovery, RobotError, Snapshot
 from hcpg.robots.franka.checks import checks
 from hcpg.robots.franka.kinematics import point_velocity
 from hcpg.robots.franka.link import DOWN, Link
@@ -39,14 +39,7 @@ class FrankaArm:
             RobotError: nobody answers, or a check failed; the message says which and the cure.
         """
         self._let_go()
-        silent = f"no answer from {self._address} in {timeout_s:g} s; is it switched on, and FCI activated?"
-        link = _within(timeout_s, self._opened, silent)
-        done = checks(link.states.value, link.hand.widest_m, self.limits, self._setup)
-        failed = [each for each in done if not each.passed]
-        if failed:
-            link.close(CLOSES_S)
-            raise RobotError("; ".join(f"{each.name}: no, {each.found}; {each.cure}" for each in failed))
-        _within(timeout_s, link.follow, f"{self._address} does not start its motion; look at Desk")
+        link, done = self._within(timeout_s, self._opened)
         self._link = link
         self._gate.open()
         self._stay()
@@ -105,7 +98,7 @@ class FrankaArm:
         if link is None or link.mode == "disconnected" or self._gate.closed:
             return Recovery(False, True, "the connection is gone; connect again")
         try:
-            _within(timeout_s, link.recover, f"no recovery within {timeout_s:g} s")
+            self._within(timeout_s, link.recover)
         except RobotError as error:
             return Recovery(False, link.mode == "disconnected", str(error))
         self._gate.advance()
@@ -140,11 +133,24 @@ class FrankaArm:
         self.stop("closed")
         self._let_go()
 
-    def _opened(self) -> Link:
+    def _opened(self) -> tuple[Link, tuple[Check, ...]]:
+        """A connection whose checks have passed, under impedance control."""
         link = Link(self._address, self._setup, self.limits, self._gate.advance)
+        try:
+            return link, self._started(link)
+        except Exception:
+            link.close(CLOSES_S)
+            raise
+
+    def _started(self, link: Link) -> tuple[Check, ...]:
         if link.mode == "reflex":
-            link.recover()
-        return link
+            link.clear()
+        done = checks(link.states.value, link.hand.widest_m, self.limits, self._setup)
+        failed = [each for each in done if not each.passed]
+        if failed:
+            raise RobotError("; ".join(f"{each.name}: no, {each.found}; {each.cure}" for each in failed))
+        link.follow()
+        return done
 
     def _sound(self) -> Snapshot:
         """The newest state of an arm that may move.
@@ -176,27 +182,27 @@ class FrankaArm:
         if link is not None:
             link.close(CLOSES_S)
 
+    def _within(self, timeout_s: float, call: Callable[[], Any]) -> Any:
+        """What `call` gives, made in a thread of its own so that it cannot hang.
 
-def _within(timeout_s: float, call: Callable[[], Any], silent: str) -> Any:
-    """What `call` gives, made in a thread of its own so that it cannot hang.
+        Raises:
+            RobotError: it took longer, or it failed; the message says with what.
+        """
+        answers: list[Any] = []
+        errors: list[Exception] = []
 
-    Raises:
-        RobotError: it took longer, with the message `silent`, or it failed, with its own.
-    """
-    answers: list[Any] = []
-    errors: list[Exception] = []
+        def make() -> None:
+            try:
+                answers.append(call())
+            except Exception as error:  # handed to whoever waits
+                errors.append(error)
 
-    def make() -> None:
-        try:
-            answers.append(call())
-        except Exception as error:  # handed to whoever waits
-            errors.append(error)
-
-    thread = threading.Thread(target=make, name="franka-call", daemon=True)
-    thread.start()
-    thread.join(timeout_s)
-    if errors:
-        raise RobotError(str(errors[0])) from errors[0]
-    if thread.is_alive():
-        raise RobotError(silent)
-    return answers[0]
+        thread = threading.Thread(target=make, name="franka-call", daemon=True)
+        thread.start()
+        thread.join(timeout_s)
+        if errors:
+            raise RobotError(f"Franka at {self._address}: {errors[0]}") from errors[0]
+        if thread.is_alive():
+            cure = "is it switched on, unlocked, and FCI activated?"
+            raise RobotError(f"Franka at {self._address}: no answer in {timeout_s:g} s; {cure}")
+        return answers[0]

@@ -51,7 +51,7 @@ class Link:
         self._franky: Any = importlib.import_module("franky")
         self._setup, self._limits, self._on_fault = setup, limits, on_fault
         realtime = self._franky.RealtimeConfig
-        self.robot = self._franky.Robot(
+        self.robot: Any = self._franky.Robot(
             address, realtime_config=realtime.Enforce if setup.realtime else realtime.Ignore
         )
         self._tracker: Any = None
@@ -102,13 +102,21 @@ class Link:
         """
         self._tracker = None
         self._forget_motion(STARTS_S)
+        self.clear()
+        self.follow()
+
+    def clear(self) -> None:
+        """Clear the controller's errors, and wait for a state from after that.
+
+        Raises:
+            RobotError: the errors stay.
+        """
         if not self.robot.recover_from_errors():
-            raise RobotError("the controller's errors stay; look at Desk, then try again")
-        seen = self.states.value.number
-        until_s = time.perf_counter() + STARTS_S
+            raise RobotError("its errors stay; look at Desk, then try again")
+        self._fault = None
+        seen, until_s = self.states.value.number, time.perf_counter() + STARTS_S
         while self.states.value.number < seen + 2 and time.perf_counter() < until_s:
             time.sleep(STATE_S)
-        self.follow()
 
     def end(self) -> None:
         """End the motion smoothly, in the background; safe to call again."""
@@ -122,6 +130,7 @@ class Link:
         self.hand.close(timeout_s)
         self.states.close(timeout_s)
         self._forget_motion(timeout_s)
+        self.robot = None  # its connection ends with the last reference to it
 
     def _read(self) -> Reading:
         time.sleep(STATE_S)

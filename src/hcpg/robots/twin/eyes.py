@@ -1,6 +1,6 @@
 """What is seen of a twin's scene: some positions touched off once, others photographed late, with noise."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from hcpg.twin.bench import Places
 from hcpg.twin.scenes import Scene
 
 
+@runtime_checkable
 class Source(Protocol):
     """A scene that tells where its things are: a `World`, or a `Listener` to a served one."""
 

@@ -78,7 +78,7 @@ class FastTwin:
             if clock.now_s() > until_s:
                 self._stay()
                 raise RobotError(f"the arm is not at its start after {timeout_s:g} s; see what blocks it")
-            physics.target = target
+            physics.aim(target)
             clock.sleep_until(clock.now_s() + 1.0 / self.limits.rate_hz)
         self._gate.advance()
         self._stay()
@@ -89,7 +89,7 @@ class FastTwin:
 
     def _send(self, command: Command) -> None:
         with self._world.lock:
-            self._world.physics.target = np.array(command.position, np.float64)
+            self._world.physics.aim(np.array(command.position, np.float64))
             self._grip(command.grip)
         self._holds = False
 
@@ -99,7 +99,7 @@ class FastTwin:
 
     def _stay(self) -> None:
         with self._world.lock:
-            self._world.physics.target = self._world.physics.position
+            self._world.physics.stay()
         self._holds = True
 
     def _upright(self) -> Check:
