@@ -38,9 +38,11 @@ class Teller:
         """Bind the port at a loopback address and answer in a thread."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind((host, PORT))
-        self._said = b"{}"
+        self._socket.settimeout(ANSWER_S)
+        self._said, self._ends = b"{}", threading.Event()
         self.requests: queue.SimpleQueue[Request] = queue.SimpleQueue()
-        threading.Thread(target=self._serve, name="twin-teller", daemon=True).start()
+        self._thread = threading.Thread(target=self._serve, name="twin-teller", daemon=True)
+        self._thread.start()
 
     def say(self, bench: Bench, ticket: int) -> None:
         """From now on, answer with what is so now; `ticket` is that of the last request taken."""
@@ -53,13 +55,22 @@ class Teller:
         }
         self._said = json.dumps(facts, default=np.ndarray.tolist).encode()
 
+    def close(self) -> None:
+        """Stop answering; safe to call twice."""
+        self._ends.set()
+        self._thread.join()
+
     def _serve(self) -> None:
-        while True:
-            message, sender = self._socket.recvfrom(LARGEST)
+        while not self._ends.is_set():
+            try:
+                message, sender = self._socket.recvfrom(LARGEST)
+            except TimeoutError:
+                continue
             asked = json.loads(message)
             if asked:
                 self.requests.put(Request(**asked))
             self._socket.sendto(self._said, sender)
+        self._socket.close()
 
 
 class Listener:
@@ -69,7 +80,8 @@ class Listener:
         self._address, self._tickets = (host, PORT), itertools.count(1)
         self._told: tuple[float, dict[str, Any]] = (-np.inf, {})
         self._ends = threading.Event()
-        threading.Thread(target=self._follow, name="twin-listener", daemon=True).start()
+        self._thread = threading.Thread(target=self._follow, name="twin-listener", daemon=True)
+        self._thread.start()
 
     def arrange(self, start: int) -> None:
         """Have start state `start` laid out, as soon as the arm is clear of the things.
@@ -107,8 +119,9 @@ class Listener:
         return {name: np.array(place) for name, place in self._facts(SEEN_S).get("moving", {}).items()}
 
     def close(self) -> None:
-        """End the thread."""
+        """Stop asking; safe to call twice."""
         self._ends.set()
+        self._thread.join()
 
     def _facts(self, age_s: float) -> dict[str, Any]:
         told_s, facts = self._told

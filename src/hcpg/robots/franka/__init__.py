@@ -48,13 +48,18 @@ class FrankaRobot:
             raise RobotError("a Franka has an address; give it, e.g. --address 172.16.0.2")
         if address == "localhost" or address.startswith("127."):
             raise RobotError(f"{address} is this machine, so what answers is a twin; use --robot twin")
-        if importlib.util.find_spec("franky") is None:
+        if not has_driver():
             raise RobotError("the driver is missing; install it: pip install franky-control==2.0.0")
         eyes = Calibrated.read(POSITIONS, _objects(task))
-        return Rig(FrankaArm(address, _limits(task), ARM), eyes, Person())
+        return Rig(FrankaArm(address, task_limits(task), ARM), eyes, Person())
 
 
 ROBOT = FrankaRobot()
+
+
+def has_driver() -> bool:
+    """Whether franky is installed."""
+    return importlib.util.find_spec("franky") is not None
 
 
 def _objects(task: str) -> tuple[str, ...]:
@@ -66,5 +71,6 @@ def _objects(task: str) -> tuple[str, ...]:
     return TOUCHED_OFF[task]
 
 
-def _limits(task: str) -> Limits:
+def task_limits(task: str) -> Limits:
+    """What the arm may do in a task."""
     return replace(LIMITS, box_low_m=(*LIMITS.box_low_m[:2], LOWEST_M.get(task, LIMITS.box_low_m[2])))
