@@ -4,7 +4,7 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
-from hcpg.report import ablation_figures, bars, figures, progress, strips
+from hcpg.report import ablation_figures, bars, figures, learning_progress, strips
 from hcpg.report.ablation import ablated, candidate_table
 from hcpg.report.pictures import save
 from hcpg.report.provenance import provenance
@@ -29,9 +29,9 @@ def write_figures(groups: Sequence[Group], folder: Path, command: str) -> list[P
         caption, name = bars.CAPTION.format(suite=suite), f"bars_{suite}"
         if _fits(name, own):
             written += save(bars.success_bars(own), folder / name, caption, provenance(own, command))
-    averaged = progress.progress_figure(groups)
+    averaged = learning_progress.progress_figure(groups)
     if averaged is not None:
-        written += save(averaged, folder / "progress", progress.CAPTION, origin)
+        written += save(averaged, folder / "progress", learning_progress.CAPTION, origin)
     written += _strips(groups, folder, command)
     return written + _ablation(ablated(groups), folder, command)
 

@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 
-from hcpg.report.progress import profiles, progress_figure
+from hcpg.report.learning_progress import profiles, progress_figure
 from hcpg.report.records import RecordError, load_runs
 from hcpg.report.styles import COLUMN_IN
 
