@@ -46,6 +46,7 @@ EXPECTED = {
     "huge_action": (["time_limit", "time_limit"], "time_limit", None, ""),
     "wrong_shape": (["success", "success"], "success", 0, ""),
     "out_of_box": (["time_limit", "time_limit"], "time_limit", None, ""),
+    "into_the_table": (["time_limit", "time_limit"], "time_limit", None, ""),
     "frozen_perception": (["time_limit", "fault"], "time_limit", 7, ""),
     "camera_gap": (["success", "success"], "success", 7, ""),
     "gripper_refusal": (["fault", "fault"], "the gripper refused 4 commands", 4, ""),
@@ -125,7 +126,7 @@ def test_a_fault_costs_its_recovery_and_a_reset(outcomes):
 
 def test_the_wall_of_the_box_was_reached(outcomes):
     # 25 cm at 20 mm a step, with a lag: long before the 60th action; from then on every action is limited.
-    for name in ("out_of_box", "huge_action"):
+    for name in ("out_of_box", "into_the_table", "huge_action"):
         assert outcomes[name]["limited"]["box"] > 50
     assert outcomes["none"]["limited"].get("box", 0) == 0
 

@@ -47,7 +47,18 @@ def test_states_that_do_not_come_show_in_their_age():
     robot.observe()
     connect = robot.connect
     robot.connect = lambda timeout_s: (connect(timeout_s), setattr(robot.wrong, "frozen", True))[0]
-    assert watch(robot, 1.0).state_age_max_ms == pytest.approx(1000.0)
+    seen = watch(robot, 1.0)
+    assert (seen.state_age_max_ms, seen.sound) == (pytest.approx(1000.0), False)
+
+
+def test_commands_that_come_late_are_not_ready():
+    def watched(rate):
+        arm = new_rig().robot
+        observe = arm.observe
+        arm.observe = lambda: observe()._replace(success_rate=rate)
+        return watch(arm, 0.2).sound
+
+    assert (watched(0.95), watched(0.94)) == (True, False)
 
 
 def test_a_robot_outside_its_box_is_not_ready():

@@ -21,7 +21,7 @@ from hcpg.safety.faults import FaultyRobot
 from hcpg.selection import Selector
 from hcpg.types import Float
 
-EPISODES, HORIZON, CANDIDATES = 2, 60, 4
+EPISODES, CANDIDATES = 2, 4
 FIRST_TICK = 15
 """The fault begins at this tick of the first episode: half a second into it."""
 
@@ -119,6 +119,8 @@ class Fault(NamedTuple):
     repeats: bool = False
     """Whether it is injected at every tick, until then."""
     purpose: Purpose = "evaluate"
+    horizon: int = 60
+    """Most actions of each episode."""
 
 
 class Outcome(NamedTuple):
@@ -176,7 +178,7 @@ def drill(
     parts = Rig(site.robot, site, rig.stage)
     crew = Crew.of(parts, task, chooser, worker_for(clock, "policy"), log)
     site.button = crew.button
-    session = Session(crew, worker_for(clock, "robot calls"), HORIZON)
+    session = Session(crew, worker_for(clock, "robot calls"), fault.horizon)
     return _outcome(fault, site, session.run(range(EPISODES), fault.purpose, site), log.path)
 
 

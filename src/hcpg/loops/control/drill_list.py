@@ -77,10 +77,15 @@ def _narrowed(proposals: np.ndarray) -> np.ndarray:
     return proposals[:, 1:]
 
 
-def _along_x(proposals: np.ndarray) -> np.ndarray:
-    driven = np.zeros_like(proposals)
-    driven[:, 0] = 1.0
-    return driven
+def _driving(axis: int, sign: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Proposals that all go one way along an axis."""
+
+    def drive(proposals: np.ndarray) -> np.ndarray:
+        driven = np.zeros_like(proposals)
+        driven[:, axis] = sign
+        return driven
+
+    return drive
 
 
 def _closing(proposals: np.ndarray) -> np.ndarray:
@@ -125,7 +130,8 @@ FAULTS: Mapping[str, Fault] = {
     "infinite_action": Fault("proposals are infinite for 5 ticks", _spoil(_filled(np.inf)), 5, _unspoil),
     "huge_action": Fault("every number of the proposals is 1000", _spoil(_filled(1000.0))),
     "wrong_shape": Fault("proposals lack a column for 5 ticks", _spoil(_narrowed), 5, _unspoil),
-    "out_of_box": Fault("the policy drives into the wall of the box", _spoil(_along_x)),
+    "out_of_box": Fault("the policy drives into a wall of the box", _spoil(_driving(0, 1.0)), horizon=200),
+    "into_the_table": Fault("the policy drives straight down", _spoil(_driving(2, -1.0)), horizon=200),
     "frozen_perception": Fault("the camera's last picture stays", _blind),
     "camera_gap": Fault("no picture for 600 ms", _blind, 18, _see),
     "gripper_refusal": Fault("the gripper refuses every command", _refuse_grip),

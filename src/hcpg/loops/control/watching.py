@@ -11,6 +11,9 @@ from hcpg.loops.control.stopping import StopButton
 from hcpg.robot_types import Info, Mode
 from hcpg.safety.limiting import outside_m
 
+LEAST_SUCCESS_RATE = 0.95
+"""Of the commands that reach the controller in time."""
+
 
 class Watched(NamedTuple):
     """What was seen while the arm held."""
@@ -18,6 +21,8 @@ class Watched(NamedTuple):
     info: Info
     timing: Timing
     state_age_max_ms: float
+    state_age_bound_ms: float
+    """Beyond it, a session holds."""
     body_max_ms: float
     """The longest that looking and holding took."""
     success_rate_min: float
@@ -32,10 +37,13 @@ class Watched(NamedTuple):
 
     @property
     def sound(self) -> bool:
-        """Whether every check passed, the arm is inside its box and held, and deadlines were kept."""
+        """Whether checks passed, the arm held inside its box, states came in time, deadlines were kept."""
         passed = all(check.passed for check in self.info.checks)
         still = self.outside_mm == 0.0 and set(self.modes) <= {"idle", "move"}
-        return passed and still and self.timing.sound and self.signal is None
+        heard = (
+            self.state_age_max_ms <= self.state_age_bound_ms and self.success_rate_min >= LEAST_SUCCESS_RATE
+        )
+        return passed and still and heard and self.timing.sound and self.signal is None
 
 
 def watch(robot: Robot, seconds: float, connect_s: float = 10.0) -> Watched:
@@ -72,6 +80,7 @@ def _held(robot: Robot, info: Info, seconds: float, button: StopButton) -> Watch
         info=info,
         timing=deadlines.timing(),
         state_age_max_ms=1000 * max(ages),
+        state_age_bound_ms=1000 * robot.limits.stale_hold_s,
         body_max_ms=1000 * max(bodies),
         success_rate_min=min(rates),
         modes=tuple(modes),
