@@ -67,6 +67,22 @@ def test_the_best_of_several_in_a_row_is_bold_and_an_equal_one_too(root):
     assert "budget cpu, steps 500, adapter paper" in text
 
 
+def test_one_task_has_no_mean_across_tasks(write_run):
+    table = main_table(load_runs([write(write_run, "sac", "point/reach", [1, 2, 3])]))
+    assert table.across == {}
+    assert [line.split(" |")[0] for line in markdown(table).splitlines()[2:4]] == ["| Reach", ""]
+    assert latex(table).count("midrule") == 1
+
+
+def test_tasks_of_one_name_in_two_suites_keep_their_own(write_run):
+    write(write_run, "sac", "point/reach", [1, 1, 1])
+    table = main_table(load_runs([write(write_run, "sac", "metaworld/reach", [9, 9, 9])]))
+    assert {task: cell.mean for (task, _), cell in table.cells.items()} == {
+        "metaworld/reach": pytest.approx(90),
+        "point/reach": pytest.approx(10),
+    }
+
+
 def test_the_csv_has_every_number(root):
     rows = list(csv.DictReader(io.StringIO(as_csv(main_table(load_runs([root]))))))
     assert len(rows) == 5

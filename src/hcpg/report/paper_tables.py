@@ -40,7 +40,7 @@ class MainTable(NamedTuple):
     cells: dict[tuple[str, str], Spread]
     """By (task, method); a pair that has no runs is not there."""
     across: dict[str, Spread]
-    """By method, for methods that have every task."""
+    """By method, for methods that have every task; none where there is one task alone."""
     protocol: dict[str, str]
     """What all runs have alike: budget, steps, adapter, evaluation episodes, seeds."""
 
@@ -61,7 +61,7 @@ def main_table(groups: Sequence[Group]) -> MainTable:
     across = {
         method: spread(np.array([cells[task, method].mean for task in tasks]))
         for method in methods
-        if all((task, method) in cells for task in tasks)
+        if len(tasks) > 1 and all((task, method) in cells for task in tasks)
     }
     return MainTable(tasks, methods, cells, across, protocol)
 
@@ -111,16 +111,18 @@ def as_csv(table: MainTable) -> str:
 
 def latex(table: MainTable) -> str:
     r"""As LaTeX with booktabs rules, the best mean of every row in bold; needs \usepackage{booktabs}."""
-    *tasks, across = _rows(table, r"{} $\pm$ {}", r"\textbf{{{}}}", "--")
-    return booktabs(["Task", *table.methods], [tasks, [across]], _note(table))
+    rows = _rows(table, r"{} $\pm$ {}", r"\textbf{{{}}}", "--")
+    blocks = [rows[: len(table.tasks)], rows[len(table.tasks) :]]
+    return booktabs(["Task", *table.methods], [block for block in blocks if block], _note(table))
 
 
 def _rows(table: MainTable, form: str, best: str, absent: str) -> list[list[str]]:
-    """A row per task and one across them; the best printed means of a row are marked, if it has several."""
+    """A row per task and one across several; the best printed means of a row with several are marked."""
     rows = [[table.cells.get((task, method)) for method in table.methods] for task in table.tasks]
-    rows.append([table.across.get(method) for method in table.methods])
+    if len(table.tasks) > 1:
+        rows.append([table.across.get(method) for method in table.methods])
     texts = []
-    for name, row in zip([*table.tasks, ACROSS], rows, strict=True):
+    for name, row in zip([*table.tasks, ACROSS], rows, strict=False):
         means = [round(each.mean, 1) for each in row if each is not None]
         top = max(means) if len(means) > 1 else None
         cells = [absent if each is None else form.format(*_printed(each)) for each in row]

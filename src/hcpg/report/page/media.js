@@ -1,5 +1,7 @@
 // Videos by task, and the figures that lie beside the page.
 
+const BROAD = 1.9;
+
 function videosSection(data) {
   if (!data.videos.length) return null;
   const looks = new Map(data.presets.map((each) => [each.preset, each]));
@@ -17,10 +19,15 @@ function film(each, look) {
   return make("figure", { class: "card film" }, shown, about);
 }
 
+// A picture of several panels gets the whole width.
+function spread({ currentTarget: image }) {
+  if (image.naturalWidth > BROAD * image.naturalHeight) image.closest("figure").classList.add("broad");
+}
+
 function picturesSection(data) {
   if (!data.pictures.length) return null;
   return section("figures", "Figures", make("div", { class: "pictures" }, data.pictures.map((each) =>
     make("figure", { class: "card picture" },
-      each.data ? make("img", { src: each.data, alt: each.caption.split("\n")[0] || each.name, loading: "lazy" }) : make("a", { class: "linked", href: each.link }, "Too large to embed: open the file"),
+      each.data ? make("img", { src: each.data, alt: each.caption.split("\n")[0] || each.name, onload: spread }) : make("a", { class: "linked", href: each.link }, "Too large to embed: open the file"),
       make("figcaption", {}, make("strong", {}, each.name), " ", each.caption.split("\n")[0])))));
 }

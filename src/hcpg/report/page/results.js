@@ -81,7 +81,7 @@ function numbersTable(data) {
   const looks = new Map(data.presets.map((each) => [each.preset, each]));
   const names = new Map(data.tasks.map((each) => [each.task, each.name]));
   const rows = data.results.flatMap((each) => ["own", "bare"].filter((kind) => each[kind]).map((kind) => ({ ...each, at: each[kind], kind })));
-  const selector = (row) => (row.kind === "bare" || !row.selector ? "bare" : `with ${row.selector}`);
+  const selector = (row) => (row.kind === "bare" || !row.selector ? "bare" : row.selector);
   const spreadOf = (metric) => ({ name: METRICS[metric][0], number: true, title: METRICS[metric][1], value: (row) => row.at[metric].mean, cell: (row) => withDeviation(row.at[metric]) });
   const columns = [
     { name: "Task", value: (row) => names.get(row.task) },
