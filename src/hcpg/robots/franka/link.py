@@ -18,6 +18,8 @@ STATE_S = 0.004
 """Between two looks at the state."""
 STARTS_S = 1.0
 """Within this time a controller that was started is in control."""
+LEAST_RATE = 0.5
+"""Of the commands that reach a controller in time: what it counts once it has started."""
 DOWN = np.array([1.0, 0.0, 0.0, 0.0])
 """The hand's fixed nominal orientation: pointing down, fingers opening along the base's y."""
 AGREES_M = 0.002
@@ -62,6 +64,7 @@ class Link:
         if setup.sets_frame:
             self._set_frame(hand_frame())
         self.states = Newest(self._read, "franka-states")
+        self._posture = np.array(self.states.value.state.q)
         self.hand = Hand(self._franky.Gripper(address), setup.grip_speed_m_s, setup.grip_force_n)
 
     @property
@@ -70,23 +73,22 @@ class Link:
         return "disconnected" if self.states.error is not None else self.states.value.mode
 
     def follow(self) -> None:
-        """Begin impedance control around where the arm is."""
-        state = self.states.value.state
+        """Begin impedance control around where the arm is, in the posture of the connection's beginning.
+
+        Raises:
+            RobotError: the controller does not start, or loses most commands.
+        """
         tracker = self._franky.CartesianImpedanceTracker(
             self.robot,
             translational_stiffness=self._limits.stiffness_n_m,
             rotational_stiffness=self._setup.rotation_nm_rad,
             translational_error_clip=np.full(3, self._limits.reach_m),
             rotational_error_clip=np.full(3, self._setup.turn_rad),
-            posture_task=self._franky.PostureTask(np.array(state.q), self._setup.posture_nm_rad),
+            posture_task=self._franky.PostureTask(self._posture, self._setup.posture_nm_rad),
         )
-        until_s = time.perf_counter() + STARTS_S
-        while not self.robot.is_in_control:
-            if time.perf_counter() > until_s:
-                self.robot.poll_motion()
-                raise RobotError("the controller does not start; look at Desk, then connect again")
-            time.sleep(STATE_S)
+        _wait_for(lambda: self.robot.is_in_control, "the controller does not start; look at Desk")
         self._tracker, self._fault = tracker, None
+        _wait_for(self._hears, "the controller hears too few commands; look at the network and the kernel")
 
     def aim(self, position: Float[np.ndarray, " 3"]) -> None:
         """Let the target be there; the 1 kHz loop takes it up in its next cycle."""
@@ -113,10 +115,8 @@ class Link:
         """
         if not self.robot.recover_from_errors():
             raise RobotError("its errors stay; look at Desk, then try again")
-        self._fault = None
-        seen, until_s = self.states.value.number, time.perf_counter() + STARTS_S
-        while self.states.value.number < seen + 2 and time.perf_counter() < until_s:
-            time.sleep(STATE_S)
+        self._fault, seen = None, self.states.value.number
+        _wait_for(lambda: self.states.value.number >= seen + 2, "the controller sends no states")
 
     def end(self) -> None:
         """End the motion smoothly, in the background; safe to call again."""
@@ -131,6 +131,11 @@ class Link:
         self.states.close(timeout_s)
         self._forget_motion(timeout_s)
         self.robot = None  # its connection ends with the last reference to it
+
+    def _hears(self) -> bool:
+        """Whether the controller moves by our commands, and most of them reach it."""
+        reading = self.states.value
+        return reading.mode == "move" and reading.state.control_command_success_rate > LEAST_RATE
 
     def _read(self) -> Reading:
         time.sleep(STATE_S)
@@ -169,3 +174,16 @@ class Link:
             if np.linalg.norm(state.O_T_EE.translation - expected[:3, 3]) < AGREES_M:
                 return
         raise RobotError("the controller does not take the end effector's frame; set it in Desk")
+
+
+def _wait_for(condition: Callable[[], bool], otherwise: str) -> None:
+    """Wait until the condition holds.
+
+    Raises:
+        RobotError: it does not hold within `STARTS_S`; the message is `otherwise`.
+    """
+    until_s = time.perf_counter() + STARTS_S
+    while not condition():
+        if time.perf_counter() > until_s:
+            raise RobotError(otherwise)
+        time.sleep(STATE_S)
