@@ -67,6 +67,8 @@ class FastTwin:
         Raises:
             RobotError: it was stopped, or it did not get there in time.
         """
+        if self._gate.closed:
+            raise RobotError("the robot is stopped; connect first")
         self._gate.advance()
         self._grip(grip)
         physics, clock = self._world.physics, self.clock
