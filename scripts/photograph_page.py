@@ -13,8 +13,8 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 
 PATIENCE_MS = 10_000
-COLORS = 96
-"""Enough for a page; a third of the bytes."""
+COLORS = 256
+"""Enough for a page, at less than half the bytes."""
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 
 

@@ -30,6 +30,7 @@ const signed = (value, digits = 1) => (value === null ? ABSENT : (value > 0 ? "+
 const thousands = (value) => (value === null || value === undefined ? ABSENT : value.toLocaleString("en-US"));
 const short = (steps) => (steps >= 1e6 ? `${+(steps / 1e6).toFixed(2)}M` : steps >= 1000 ? `${+(steps / 1000).toFixed(1)}k` : String(steps));
 const withDeviation = (each) => (each.deviation === null ? fixed(each.mean) : `${fixed(each.mean)} ± ${fixed(each.deviation)}`);
+const counted = (count, one, several) => `${thousands(count)} ${count === 1 ? one : several}`;
 const bounds = (each, form = fixed) => `${form(each.low)} to ${form(each.high)}`;
 const mean = (values) => (values.length ? values.reduce((sum, value) => sum + value, 0) / values.length : null);
 

@@ -10,7 +10,7 @@ function settingsSection(data) {
   return section("settings", "What differs between the methods",
     rows.length ? table({ label: "Settings that differ", columns, rows, filter: rows.length > 12 }) : note("Nothing: all settings are alike."),
     note("Settings from the runs' own ", make("code", {}, "config.json"), "; ", ABSENT, " where a method has no such setting."),
-    alike.length ? folded(`${alike.length} settings are alike`, () => facts(alike)) : null);
+    alike.length ? folded(counted(alike.length, "setting is alike", "settings are alike"), () => facts(alike)) : null);
 }
 
 // A value that only this method has stands out.
@@ -40,6 +40,6 @@ function manifestSection(data) {
   return section("manifest", "Manifest",
     facts([["command", data.made.command], ["code", data.made.commit], ["runs", thousands(runs.length)], ...Object.entries(data.protocol)]),
     Object.keys(differing).length ? [make("h3", {}, "Facts that differ between runs"), facts(Object.entries(differing))] : null,
-    folded(`${Object.keys(alike).length} facts that all runs share`, () => facts(Object.entries(alike))),
-    folded(`${thousands(runs.length)} runs`, () => table({ label: "Runs", columns, rows: runs, filter: true })));
+    Object.keys(alike).length ? folded(counted(Object.keys(alike).length, "fact that all runs share", "facts that all runs share"), () => facts(Object.entries(alike))) : null,
+    folded(counted(runs.length, "run", "runs"), () => table({ label: "Runs", columns, rows: runs, filter: true })));
 }

@@ -6,7 +6,7 @@ const THEMES = ["system", "light", "dark"];
 
 function noticesSection(data) {
   if (!data.notices.length) return null;
-  return section("notices", data.notices.length === 1 ? "1 notice" : `${thousands(data.notices.length)} notices`,
+  return section("notices", counted(data.notices.length, "notice", "notices"),
     noticeList(data.notices.slice(0, FEW)),
     data.notices.length > FEW ? folded("Show the others", () => noticeList(data.notices.slice(FEW))) : null);
 }
