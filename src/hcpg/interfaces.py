@@ -212,7 +212,11 @@ class Stage(Protocol):
     """Whoever lays out the scene before an episode: the twin itself, or a person who is asked to."""
 
     def arrange(self, start: int) -> None:
-        """Lay out start state `start`, any integer >= 0; the same layout every time."""
+        """Lay out start state `start`, any integer >= 0; the same layout every time. The arm is at home."""
+        ...
+
+    def close(self) -> None:
+        """Let go of what it uses; safe to call twice."""
         ...
 
 

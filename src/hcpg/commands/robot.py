@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -37,7 +38,8 @@ def run(arguments: Sequence[str]) -> int:
 def _check(options: argparse.Namespace) -> int:
     """0 where the robot is ready."""
     rig = _announced(options)
-    seen = watch(rig.robot, options.seconds)
+    with closing(rig.stage):
+        seen = watch(rig.robot, options.seconds)
     sys.stdout.writelines(f"{line}\n" for line in _watched_lines(seen, options.seconds))
     if options.out is not None:
         options.out.write_text(json.dumps(plain(seen), indent=2) + "\n")
@@ -53,7 +55,8 @@ def _run(options: argparse.Namespace) -> int:
     chooser = Chooser(propose, selector, address.adapters[options.adapter], task.action_size, options.seed)
     options.out.mkdir(parents=True, exist_ok=True)
     session = Session.of(rig, task, chooser, options.out / STEPS, options.horizon or address.horizon)
-    done = session.run(range(options.start, options.start + options.episodes))
+    with closing(rig.stage):
+        done = session.run(range(options.start, options.start + options.episodes))
     kind = registry.robot(options.robot).kind
     sys.stdout.writelines(f"{kind}: {_episode_line(each)}\n" for each in done.episodes)
     sys.stdout.write(f"ended early: {done.ended}\n" if done.ended else "")
@@ -88,7 +91,9 @@ def _drilled(options: argparse.Namespace, name: str) -> Outcome:
     plugin = registry.robot(options.robot)
     rig = plugin.make(options.task, options.address)
     read_scene = registry.task(options.task).adapters["paper"]
-    return drill(rig, plugin.kind, registry.robot_task(options.task), read_scene, FAULTS[name], folder)
+    task = registry.robot_task(options.task)
+    with closing(rig.stage):
+        return drill(rig, plugin.kind, task, read_scene, FAULTS[name], folder)
 
 
 def _announced(options: argparse.Namespace) -> Rig:

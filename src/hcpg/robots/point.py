@@ -168,6 +168,9 @@ class PointStage:
             "goal": random.uniform([-0.2, -0.2, 0.1], [0.2, 0.2, 0.25]),
         }
 
+    def close(self) -> None:
+        """Nothing to let go of."""
+
 
 class PointRobot:
     """The plug-in."""

@@ -138,7 +138,10 @@ class FaultyRobot:
             return Recovery(False, False, "the errors stay (injected)")
         self.wrong.mode = None
         self._gate.advance()
-        return self._robot.recover(timeout_s)
+        if self._robot.observe().mode == "reflex":
+            return self._robot.recover(timeout_s)
+        self._robot.hold()
+        return Recovery(not self._gate.closed, self._gate.closed, "the injected reflex is cleared")
 
     def reset(self, position: tuple[float, float, float], grip: Grip, timeout_s: float) -> None:
         """As the robot, if nothing is wrong.

@@ -36,6 +36,9 @@ class World:
             self._bench.ask_for(start)
             self._tick()
 
+    def close(self) -> None:
+        """Nothing to let go of."""
+
     def now_s(self) -> float:
         """Simulated seconds since the last `place`."""
         return self.physics.steps * TIMESTEP_S

@@ -136,8 +136,9 @@ def test_a_lost_connection_is_made_anew_not_recovered(tmp_path):
 def test_a_reset_that_fails_is_mended_too(tmp_path):
     rig, robot = faulty()
     made, _ = session(tmp_path, rig=rig)
-    rig.stage.arrange = lambda start: robot.strike("reflex") if start == 1 else None
-    done = made.run([0, 1])
+    learner = StandInLearner(lives=9)
+    learner.offer = lambda result: robot.strike("reflex") if result.start == 0 else None
+    done = made.run([0, 1], "train", learner)
     assert [each.ended for each in done.episodes] == ["time_limit", "time_limit"]
     assert ("hold", "reset: the robot is in mode reflex (injected)") in events(tmp_path)
 

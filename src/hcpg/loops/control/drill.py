@@ -167,7 +167,7 @@ def drill(
     The log is written into `folder`.
 
     Raises:
-        DrillError: the robot is a real one.
+        DrillError: the robot is a real one, or something ended the first episode before the fault.
     """
     if kind == "real":
         raise DrillError("faults are injected on twins only; a real arm has enough of its own")
@@ -179,7 +179,10 @@ def drill(
     crew = Crew.of(parts, task, chooser, worker_for(clock, "policy"), log)
     site.button = crew.button
     session = Session(crew, worker_for(clock, "robot calls"), fault.horizon)
-    return _outcome(fault, site, session.run(range(EPISODES), fault.purpose, site), log.path)
+    done = session.run(range(EPISODES), fault.purpose, site)
+    if len(site.track) <= FIRST_TICK:
+        raise DrillError(f"{fault.what}: it never came to that; {done.ended or 'the episode ended before'}")
+    return _outcome(fault, site, done, log.path)
 
 
 _SELECTOR = Selector(candidates=CANDIDATES)

@@ -13,6 +13,8 @@ from hcpg.loops.control.step_log import StepLog
 from hcpg.loops.control.workers import Worker, passes_by_itself, worker_for
 
 Purpose = Literal["train", "evaluate"]
+SETTLES_S = 0.5
+"""From the laying out to the first picture that counts."""
 
 
 @runtime_checkable
@@ -64,6 +66,8 @@ class Session:
     ) -> SessionResult:
         """One episode per start state, until they are done or something ends the session.
 
+        The stage is not closed: it belongs to whoever made the rig.
+
         Raises:
             LogError: steps could not be written at all.
             Exception: whatever the policy raised; the robot is stopped.
@@ -85,9 +89,15 @@ class Session:
         return SessionResult(tuple(results), ended, self._crew.button.signal)
 
     def _prepared(self, start: int) -> str:
-        self._crew.rig.stage.arrange(start)
-        self._crew.rig.perception.forget()
-        return self._mender.reset()
+        """The arm goes home before anybody, or anything, lays the scene out."""
+        ended = self._mender.reset()
+        if ended:
+            return ended
+        rig = self._crew.rig
+        rig.stage.arrange(start)
+        rig.robot.clock.sleep_until(rig.robot.clock.now_s() + SETTLES_S)
+        rig.perception.forget()
+        return self._mender.stopped()
 
     def _episode(self, number: int, start: int) -> EpisodeResult:
         result = Episode(self._crew, number, start, self._horizon).run()

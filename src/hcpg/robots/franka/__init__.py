@@ -32,6 +32,9 @@ class Person:
         """Ask for start state `start`, and wait until it is there."""
         input(f"Lay out start state {start}, step back, then press Enter: ")
 
+    def close(self) -> None:
+        """Nothing to let go of."""
+
 
 class FrankaRobot:
     """The plug-in; what moves is real."""
