@@ -78,10 +78,11 @@ def _drill(options: argparse.Namespace) -> int:
         outcomes[name] = outcome
         sys.stdout.write(f"{drill_table.line(name, outcome)}\n")
     (options.out / "outcomes.json").write_text(json.dumps(plain(outcomes), indent=2) + "\n")
-    table = drill_table.table(options.robot, options.task, outcomes)
+    place = drill_table.place(options.robot, options.address)
+    table = drill_table.table(place, options.task, outcomes)
     (options.out / "table.md").write_text(table)
     if options.into is not None:
-        options.into.write_text(drill_table.inserted(options.into.read_text(), options.robot, table))
+        options.into.write_text(drill_table.inserted(options.into.read_text(), place, table))
     return int(not all(map(drill_table.harmless, outcomes.values())))
 
 
@@ -89,7 +90,7 @@ def _drilled(options: argparse.Namespace, name: str) -> Outcome:
     folder = options.out / name
     folder.mkdir(parents=True, exist_ok=False)
     plugin = registry.robot(options.robot)
-    rig = plugin.make(options.task, options.address)
+    rig = _with_priority(plugin.make(options.task, options.address))
     read_scene = registry.task(options.task).adapters["paper"]
     task = registry.robot_task(options.task)
     with closing(rig.stage):
@@ -103,6 +104,11 @@ def _announced(options: argparse.Namespace) -> Rig:
     rig = plugin.make(options.task, options.address)
     sys.stdout.write(f"{options.robot} ({plugin.kind}), {options.task}; limits:\n")
     sys.stdout.writelines(f"  {line}\n" for line in _limit_lines(rig.robot.limits))
+    return _with_priority(rig)
+
+
+def _with_priority(rig: Rig) -> Rig:
+    """The rig, and this process before ordinary ones, if the robot's time does not wait for it."""
     refused = raise_priority() if passes_by_itself(rig.robot.clock) else ""
     sys.stdout.write(f"{refused}\n" if refused else "")
     return rig

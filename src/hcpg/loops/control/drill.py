@@ -180,8 +180,9 @@ def drill(
     site.button = crew.button
     session = Session(crew, worker_for(clock, "robot calls"), fault.horizon)
     done = session.run(range(EPISODES), fault.purpose, site)
-    if len(site.track) <= FIRST_TICK:
-        raise DrillError(f"{fault.what}: it never came to that; {done.ended or 'the episode ended before'}")
+    if not done.episodes or len(done.episodes[0].records) <= FIRST_TICK:
+        before = done.episodes[0].verdict.cause if done.episodes else done.ended
+        raise DrillError(f"{fault.what}: it never came to that, because of something real: {before}")
     return _outcome(fault, site, done, log.path)
 
 

@@ -36,22 +36,27 @@ def line(name: str, outcome: Outcome) -> str:
     return f"{mark:4}  {name:26}  {', '.join(outcome.endings)} ({outcome.cause}){ended}"
 
 
-def table(robot: str, task: str, outcomes: Mapping[str, Outcome]) -> str:
+def place(robot: str, address: str | None) -> str:
+    """The options that name a robot, whichever address it has: the name of its place in a document."""
+    return f"--robot {robot}" if address is None else f"--robot {robot} --address ADDRESS"
+
+
+def table(place: str, task: str, outcomes: Mapping[str, Outcome]) -> str:
     """All outcomes in Markdown, with the command that makes them."""
     head = [_line(COLUMNS), _line(["---"] * len(COLUMNS))]
     rows = [_line(_cells(name, outcome)) for name, outcome in outcomes.items()]
     count = sum(map(harmless, outcomes.values()))
-    total = f"\n{count} of {len(outcomes)} harmless: `hcpg robot drill {task} --robot {robot}`.\n"
+    total = f"\n{count} of {len(outcomes)} harmless: `hcpg robot drill {task} {place}`.\n"
     return "".join([*head, *rows, total])
 
 
-def inserted(document: str, robot: str, table: str) -> str:
-    """The document with `table` in the place that two comments mark for the robot.
+def inserted(document: str, place: str, table: str) -> str:
+    """The document with `table` in the place that two comments mark.
 
     Raises:
         DrillError: the document has no such place.
     """
-    begin, end = f"<!-- drill {robot} -->\n", "<!-- end -->\n"
+    begin, end = f"<!-- drill {place} -->\n", "<!-- end -->\n"
     before, found, rest = document.partition(begin)
     _, ended, after = rest.partition(end)
     if not found or not ended:
