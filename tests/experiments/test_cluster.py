@@ -10,9 +10,10 @@ from tiny_cells import cell
 
 from hcpg.experiments import cluster, engine
 from hcpg.experiments.claims import is_locked
-from hcpg.experiments.cluster import ClusterError, RayCluster
+from hcpg.experiments.cluster import ClusterError, RayCluster, _jobs_on
 from hcpg.experiments.engine import run
 from hcpg.experiments.ledger import entries, newest_checkpoint
+from hcpg.experiments.station import Needs
 from hcpg.loops import sitting
 from hcpg.loops.runs import RunFolder
 
@@ -33,11 +34,13 @@ def nodes():
         patch.setenv("PYTHONWARNINGS", "ignore")
         (Path(own) / "ray").mkdir()
         size = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
-        made = Cluster(initialize_head=True, head_node_args={**size, "include_dashboard": False})
-        second = made.add_node(**size)
-        yield made, second, Path(own)
-        made.shutdown()
-        signal.signal(signal.SIGTERM, terminate)
+        made = Cluster()
+        try:
+            made.add_node(**size, include_dashboard=False)
+            yield made, made.add_node(**size), Path(own)
+        finally:
+            made.shutdown()
+            signal.signal(signal.SIGTERM, terminate)
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +88,7 @@ def test_an_experiment_loses_a_node_and_ends_with_the_undisturbed_results(
     monkeypatch.setattr(cluster, "land", land_and_kill)
     monkeypatch.setattr(cluster, "command", lambda *given: words.append(command(*given)) or words[-1])
     monkeypatch.setattr(engine, "POLL_S", 0.05)
-    place = RayCluster(made.address, send_s=0.2)
+    place = RayCluster(made.address, Needs(1, 0.0), send_s=0.2)
     assert place.room()
     assert run(cells, tmp_path, place, told.append) == ([], None)
     place.close()
@@ -107,9 +110,25 @@ def test_an_experiment_loses_a_node_and_ends_with_the_undisturbed_results(
 
 def test_a_job_that_no_node_can_hold_is_refused(nodes):
     with pytest.raises(ClusterError, match=r"no node has room for a job of 1 cores and 0\.5 GPUs"):
-        RayCluster(nodes[0].address, gpus_per_job=0.5)
+        RayCluster(nodes[0].address, Needs(1, 0.5), patience_s=0.0)
 
 
 def test_a_cluster_that_does_not_answer_is_named():
     with pytest.raises(ClusterError, match=r"no Ray cluster answers at '127\.0\.0\.1:1'"):
-        RayCluster("127.0.0.1:1")
+        RayCluster("127.0.0.1:1", Needs(1, 0.0), patience_s=0.0)
+
+
+@pytest.mark.parametrize(
+    ("node", "needs", "jobs"),
+    [
+        ({"CPU": 16.0, "GPU": 2.0}, Needs(1, 0.0), 16),
+        ({"CPU": 16.0, "GPU": 2.0}, Needs(3, 0.0), 5),
+        ({"CPU": 16.0, "GPU": 2.0}, Needs(2, 0.5), 4),
+        ({"CPU": 16.0, "GPU": 2.0}, Needs(2, 0.3), 6),
+        ({"CPU": 16.0, "GPU": 2.0}, Needs(8, 0.25), 2),
+        ({"CPU": 16.0}, Needs(1, 1.0), 0),
+        ({"memory": 1e9}, Needs(1, 0.0), 0),
+    ],
+)
+def test_how_many_jobs_a_node_holds(node, needs, jobs):
+    assert _jobs_on(node, needs) == jobs

@@ -31,6 +31,10 @@ def checkpoint(folder, step):
         (made / name).write_text(f"{name} {step}")
 
 
+def logs(tmp_path):
+    return [tmp_path / "far/logs/one.txt"]
+
+
 def contents(root):
     hidden = {"lock"}
     files = (path for path in root.rglob("*") if path.is_file() and path.name not in hidden)
@@ -39,7 +43,7 @@ def contents(root):
 
 def test_a_run_arrives_as_it_was_and_can_be_opened(run, tmp_path):
     with run.lock():
-        parcel = pack(tmp_path / "far", [run.path], {})
+        parcel = pack(tmp_path / "far", [run.path], logs(tmp_path), {})
     land(parcel, tmp_path / "here")
     assert contents(tmp_path / "here") == contents(tmp_path / "far")
     arrived = RunFolder.open(tmp_path / "here" / run.path.relative_to(tmp_path / "far"))
@@ -49,12 +53,12 @@ def test_a_run_arrives_as_it_was_and_can_be_opened(run, tmp_path):
 
 def test_only_what_has_changed_is_sent_again_and_old_checkpoints_go(run, tmp_path):
     sent = {}
-    land(pack(tmp_path / "far", [run.path], sent), tmp_path / "here")
-    assert pack(tmp_path / "far", [run.path], sent).files == {}
+    land(pack(tmp_path / "far", [run.path], logs(tmp_path), sent), tmp_path / "here")
+    assert pack(tmp_path / "far", [run.path], logs(tmp_path), sent).files == {}
     run.append("metrics", [{"step": 16, "wall_s": 2.0}])
     checkpoint(run, 16)
     shutil.rmtree(run.checkpoints / "step_000000008")
-    parcel = pack(tmp_path / "far", [run.path], sent)
+    parcel = pack(tmp_path / "far", [run.path], logs(tmp_path), sent)
     where = str(run.path.relative_to(tmp_path / "far"))
     assert sorted(name.removeprefix(f"{where}/") for name in parcel.files) == [
         "checkpoints/step_000000016/facts.json",
@@ -75,14 +79,14 @@ def test_a_checkpoint_that_is_deleted_while_it_is_read_is_left_out(run, tmp_path
         return read(path)
 
     monkeypatch.setattr(type(run.path), "read_bytes", deleted)
-    parcel = pack(tmp_path / "far", [run.path], sent)
+    parcel = pack(tmp_path / "far", [run.path], logs(tmp_path), sent)
     [kept] = parcel.checkpoints.values()
     assert kept == ["step_000000016"]
     assert not any("step_000000008" in name for name in (*parcel.files, *sent))
 
 
 def test_a_landing_that_was_cut_short_is_made_good_by_the_next(run, tmp_path):
-    parcel = pack(tmp_path / "far", [run.path], {})
+    parcel = pack(tmp_path / "far", [run.path], logs(tmp_path), {})
     [where] = parcel.checkpoints
     half = Parcel({f"{where}/config.json": parcel.files[f"{where}/config.json"]}, {})
     arriving = tmp_path / "here" / where
@@ -95,7 +99,7 @@ def test_a_landing_that_was_cut_short_is_made_good_by_the_next(run, tmp_path):
 
 
 def test_the_tables_land_before_the_checkpoint_that_they_must_reach(run, tmp_path, monkeypatch):
-    parcel = pack(tmp_path / "far", [run.path], {})
+    parcel = pack(tmp_path / "far", [run.path], logs(tmp_path), {})
 
     def fails(parts, target):
         raise OSError("the disk is full")

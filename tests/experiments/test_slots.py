@@ -25,20 +25,15 @@ def test_a_whole_card_is_a_slot_with_its_part_of_the_cores():
     found = slots.card_slots(["0", "1"], 1.0, [0, 1, 2, 3, 4])
     assert [each.name for each in found] == ["card 0", "card 1"]
     assert [each.cores for each in found] == [{0, 2, 4}, {1, 3}]
-    assert found[1].variables == {"CUDA_VISIBLE_DEVICES": "1", "XLA_PYTHON_CLIENT_MEM_FRACTION": "0.750"}
+    assert found[1].variables == {"CUDA_VISIBLE_DEVICES": "1", "XLA_PYTHON_CLIENT_MEM_FRACTION": "0.75"}
 
 
 def test_a_card_is_shared_by_fraction():
     found = slots.card_slots(["2"], 0.3, [0, 1])
     assert [each.name for each in found] == ["card 2 part 0", "card 2 part 1", "card 2 part 2"]
     assert [each.cores for each in found] == [{0}, {1}, {0, 1}]
-    assert {each.variables["XLA_PYTHON_CLIENT_MEM_FRACTION"] for each in found} == {"0.225"}
+    assert {each.variables["XLA_PYTHON_CLIENT_MEM_FRACTION"] for each in found} == {"0.25"}
     assert {each.variables["CUDA_VISIBLE_DEVICES"] for each in found} == {"2"}
-
-
-def test_the_users_own_memory_fraction_wins(monkeypatch):
-    monkeypatch.setenv("XLA_PYTHON_CLIENT_MEM_FRACTION", ".1")
-    assert slots.memory_share(0.5) == {"XLA_PYTHON_CLIENT_MEM_FRACTION": ".1"}
 
 
 def test_the_cards_are_those_that_jax_sees_by_their_own_names(monkeypatch):

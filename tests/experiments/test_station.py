@@ -14,7 +14,7 @@ from hcpg.experiments.claims import is_locked, locked
 from hcpg.experiments.ledger import entries
 from hcpg.experiments.parcels import Parcel, land
 from hcpg.experiments.slots import core_slots
-from hcpg.experiments.station import Order, Station, StationError, sweep
+from hcpg.experiments.station import Needs, Order, Station, StationError, sweep
 from hcpg.experiments.units import command, units
 
 CORE = sorted(os.sched_getaffinity(0))[0]
@@ -31,7 +31,7 @@ def node(tmp_path, monkeypatch):
 
 def order(unit, **changes):
     words = command(unit, Path())
-    return Order(hcpg.__version__, words, unit.log, Parcel({}, {}), cores=1, gpus=0.0)._replace(**changes)
+    return Order(hcpg.__version__, words, unit.log, Parcel({}, {}), Needs(1, 0.0))._replace(**changes)
 
 
 def test_a_job_sends_its_run_and_leaves_nothing_behind(tmp_path, node):
@@ -68,14 +68,13 @@ def test_a_node_with_another_version_is_refused(tmp_path):
         Station().start(order(unit, version="0.0.9"))
 
 
-def test_cores_are_the_jobs_own_and_the_schedulers_if_too_few_are_free(tmp_path):
-    [unit] = units(entries([cell(0)], tmp_path), together=False)
+def test_cores_are_the_jobs_own_and_the_schedulers_if_too_few_are_free():
     many = len(os.sched_getaffinity(0))
     first, second = Station(), Station()
-    assert first._slot(order(unit, cores=many)).cores == os.sched_getaffinity(0)
-    assert second._slot(order(unit)).cores == frozenset()
-    assert second._slot(order(unit)).variables == {"JAX_PLATFORMS": "cpu"}
-    assert second._slot(order(unit, gpus=0.5)).variables == {"XLA_PYTHON_CLIENT_MEM_FRACTION": "0.375"}
+    assert first._slot(Needs(many, 0.0)).cores == os.sched_getaffinity(0)
+    assert second._slot(Needs(1, 0.0)).cores == frozenset()
+    assert second._slot(Needs(1, 0.0)).variables == {"JAX_PLATFORMS": "cpu"}
+    assert second._slot(Needs(1, 0.5)).variables == {"XLA_PYTHON_CLIENT_MEM_FRACTION": "0.38"}
     for lock in first._locks:
         lock.close()
 

@@ -94,8 +94,9 @@ def _place(options: argparse.Namespace) -> engine.Place:
     share = options.gpus_per_job
     if options.ray is not None:
         from hcpg.experiments.cluster import RayCluster
+        from hcpg.experiments.station import Needs
 
-        return RayCluster(options.ray, gpus_per_job=share or 0.0, cores_per_job=options.cores_per_job)
+        return RayCluster(options.ray, Needs(options.cores_per_job, share or 0.0))
     if share is None:
         share = 1.0 if machine.has_accelerator() else 0.0
     if share == 0.0:

@@ -8,6 +8,7 @@ locks hold wherever the nodes are, and the cluster may be any.
 import logging
 import os
 import socket
+import time
 from io import TextIOWrapper
 from math import floor
 from pathlib import Path
@@ -17,10 +18,13 @@ import hcpg
 from hcpg.experiments.engine import LOST
 from hcpg.experiments.ledger import Entry
 from hcpg.experiments.parcels import land, pack
-from hcpg.experiments.station import SEND_S, News, Order, Station
+from hcpg.experiments.slots import jobs_per_card
+from hcpg.experiments.station import SEND_S, Needs, News, Order, Station
 from hcpg.experiments.units import Unit, command
 
-CONNECT_S = 10.0
+PATIENCE_S = 60.0
+"""How long a cluster may take to come up before it counts as absent."""
+PAUSE_S = 0.5
 
 
 class ClusterError(RuntimeError):
@@ -31,37 +35,22 @@ class RayCluster:
     """The machines of a Ray cluster; they may come and go."""
 
     def __init__(
-        self, address: str, *, gpus_per_job: float = 0.0, cores_per_job: int = 1, send_s: float = SEND_S
+        self, address: str, needs: Needs, *, send_s: float = SEND_S, patience_s: float = PATIENCE_S
     ) -> None:
-        """Join the cluster at `address`.
+        """Join the cluster at `address`; wait for it, and for a node with room for one job, if need be.
 
         Raises:
-            ClusterError: there is none, or none of its nodes has room for a job.
+            ClusterError: after `patience_s` there is none.
         """
-        import ray
-
-        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-        try:
-            _knock(address)
-            ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
-        except OSError as error:
-            raise ClusterError(
-                f"no Ray cluster answers at {address!r} ({error}). Start one (`ray start --head`, see "
-                "docs/cluster.md) and give its HOST:6379, or auto on one of its machines."
-            ) from error
-        self.together = gpus_per_job > 0
-        self._needs = {"CPU": float(cores_per_job), "GPU": gpus_per_job}
-        self._send_s = send_s
+        deadline = time.monotonic() + patience_s
+        _join(address, deadline)
+        self.together = needs.gpus > 0
+        self._needs, self._send_s = needs, send_s
         self._jobs: list[RayJob] = []
-        if self._capacity() == 0:
-            offers = "; ".join(
-                f"{each.get('CPU', 0):g} cores, {each.get('GPU', 0):g} GPUs" for each in _resources()
-            )
-            self.close()
-            raise ClusterError(
-                f"no node has room for a job of {cores_per_job} cores and {gpus_per_job:g} GPUs "
-                f"(--cores-per-job, --gpus-per-job). The cluster's nodes have: {offers}."
-            )
+        while self._capacity() == 0:
+            if time.monotonic() > deadline:
+                raise self._no_room()
+            time.sleep(PAUSE_S)
 
     def room(self) -> bool:
         """Whether the nodes that are alive could hold one more job of this launch."""
@@ -76,9 +65,8 @@ class RayCluster:
             hcpg.__version__,
             command(moved, Path()),
             unit.log,
-            pack(results, unit.folders, {}),
-            cores=int(self._needs["CPU"]),
-            gpus=self._needs["GPU"],
+            pack(results, unit.folders, [results / unit.log], {}),
+            self._needs,
         )
         job = RayJob(order, results, self._send_s)
         self._jobs.append(job)
@@ -94,6 +82,15 @@ class RayCluster:
         """Jobs that the living nodes can hold at once."""
         return sum(_jobs_on(node, self._needs) for node in _resources())
 
+    def _no_room(self) -> ClusterError:
+        """Leave, and say what was asked for and what there is."""
+        offers = [f"{each.get('CPU', 0):g} cores and {each.get('GPU', 0):g} GPUs" for each in _resources()]
+        self.close()
+        return ClusterError(
+            f"no node has room for a job of {self._needs.cores} cores and {self._needs.gpus:g} GPUs "
+            f"(--cores-per-job, --gpus-per-job). The cluster's nodes have: {'; '.join(offers)}."
+        )
+
 
 class RayJob:
     """A unit in training somewhere in the cluster."""
@@ -101,9 +98,10 @@ class RayJob:
     def __init__(self, order: Order, results: Path, send_s: float) -> None:
         import ray
 
-        options: dict[str, Any] = {"num_cpus": order.cores, "num_gpus": order.gpus, "max_restarts": 0}
+        cores, gpus = order.needs
+        options: dict[str, Any] = {"num_cpus": cores, "num_gpus": gpus, "max_restarts": 0}
         self.place = "the cluster"
-        self.ended = False
+        self.ended = self._begun = False
         self._results, self._log = results, results / order.log
         self._station: Any = ray.remote(**options)(Station).remote(send_s)
         self._asked = self._station.start.remote(order)
@@ -121,7 +119,7 @@ class RayJob:
             return self._end(LOST, str(error))
         except RayTaskError as error:  # the station says what is wrong with its node
             return self._end(1, str(error))
-        self.place = f"node {news.node}"
+        self.place, self._begun = f"node {news.node}", True
         land(news.parcel, self._results)
         if news.code is not None:
             self._station.close.remote()
@@ -131,8 +129,13 @@ class RayJob:
         return None
 
     def stop(self, *, at_once: bool) -> None:
-        """Let it save and end, or kill it."""
-        self._station.stop.remote(at_once)
+        """Let it save and end; or kill it, which is also the end of one that has not begun."""
+        import ray
+
+        if at_once or not self._begun:
+            ray.kill(self._station)
+        else:
+            self._station.stop.remote()
 
     def _end(self, code: int, why: str) -> int:
         """Give the job up, and note in its log what it could not write there itself."""
@@ -146,11 +149,30 @@ class RayJob:
         return code
 
 
+def _join(address: str, deadline: float) -> None:
+    """Connect this process to the cluster, as soon as it is there."""
+    import ray
+
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    while True:
+        try:
+            _knock(address)
+            ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+            return
+        except OSError as error:
+            if time.monotonic() > deadline:
+                raise ClusterError(
+                    f"no Ray cluster answers at {address!r} ({error}). Start one (`ray start --head`, see "
+                    "docs/cluster.md) and give its HOST:PORT, or auto on one of its machines."
+                ) from error
+        time.sleep(PAUSE_S)
+
+
 def _knock(address: str) -> None:
-    """Fail at once where nothing listens; Ray itself would wait for minutes."""
+    """Fail at once where nobody listens at HOST:PORT; Ray itself would wait for minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if host and port.isdigit():
-        socket.create_connection((host, int(port)), timeout=CONNECT_S).close()
+        socket.create_connection((host, int(port)), timeout=PATIENCE_S).close()
 
 
 def _resources() -> list[dict[str, float]]:
@@ -160,11 +182,11 @@ def _resources() -> list[dict[str, float]]:
     return [node["Resources"] for node in ray.nodes() if node["Alive"]]
 
 
-def _jobs_on(node: dict[str, float], needs: dict[str, float]) -> int:
-    by_cores = floor(node.get("CPU", 0.0) / needs["CPU"])
-    if not needs["GPU"]:
+def _jobs_on(node: dict[str, float], needs: Needs) -> int:
+    by_cores = floor(node.get("CPU", 0.0) / needs.cores)
+    if not needs.gpus:
         return by_cores
-    return min(by_cores, floor(node.get("GPU", 0.0)) * floor(1 / needs["GPU"]))
+    return min(by_cores, floor(node.get("GPU", 0.0)) * jobs_per_card(needs.gpus))
 
 
 def _moved(entry: Entry, results: Path) -> Entry:

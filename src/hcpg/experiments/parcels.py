@@ -25,8 +25,8 @@ class Parcel(NamedTuple):
     """By run folder the checkpoints that exist: the receiver drops others."""
 
 
-def pack(root: Path, runs: Iterable[Path], sent: dict[str, Stamp]) -> Parcel:
-    """What has changed in these run folders (and the logs) under `root`; `sent` is brought up to date."""
+def pack(root: Path, runs: Iterable[Path], others: Iterable[Path], sent: dict[str, Stamp]) -> Parcel:
+    """What has changed in these run folders and other files under `root`; `sent` is brought up to date."""
     files: dict[str, bytes] = {}
     kept: dict[str, list[str]] = {}
     for run in runs:
@@ -38,30 +38,32 @@ def pack(root: Path, runs: Iterable[Path], sent: dict[str, Stamp]) -> Parcel:
         # After the checkpoints: the tables then reach at least as far as the newest one.
         _add(files, root, (path for path in run.iterdir() if path.name != "lock"), sent)
         _add(files, root, (run / "videos").rglob("*"), sent)
-    _add(files, root, (root / "logs").glob("*.txt"), sent)
+    _add(files, root, others, sent)
     return Parcel(files, kept)
 
 
 def land(parcel: Parcel, root: Path) -> None:
     """Put the parcel's files under `root`; a new run folder, like a checkpoint, appears complete."""
     for run, checkpoints in parcel.checkpoints.items():
-        own = {
-            name.removeprefix(f"{run}/"): each
-            for name, each in parcel.files.items()
-            if name.startswith(f"{run}/")
-        }
         folder = root / run
         target = folder if folder.exists() else folder.with_name(f".arriving-{folder.name}")
         for part in _PARTS:
             (target / part).mkdir(parents=True, exist_ok=True)
-        _land_run(own, target)
+        _land_run(_under(f"{run}/", parcel.files), target)
         _drop(target / "checkpoints", checkpoints)
         if target != folder:
             target.rename(folder)
+    in_runs = tuple(f"{run}/" for run in parcel.checkpoints)
     for name, content in parcel.files.items():
-        if name.startswith("logs/"):
-            (root / "logs").mkdir(parents=True, exist_ok=True)
+        if not name.startswith(in_runs):
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
             replace_file(root / name, content)
+
+
+def _under(beginning: str, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The files whose names begin so, without that beginning."""
+    names = [name for name in files if name.startswith(beginning)]
+    return {name.removeprefix(beginning): files[name] for name in names}
 
 
 def _add(files: dict[str, bytes], root: Path, paths: Iterable[Path], sent: dict[str, Stamp]) -> None:

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hcpg.experiments.claims import locked
+from hcpg.loops import machine
 
-MEMORY_OF_A_CARD = 0.75
-"""Part of a card's memory that the jobs on it may take together."""
 _COUNT_DEVICES = "import jax; print(jax.local_device_count())"
 
 
@@ -43,22 +42,21 @@ def core_slots(cores: Iterable[int]) -> list[Slot]:
 
 def card_slots(cards: list[str], share: float, cores: list[int]) -> list[Slot]:
     """As many slots on every card as its `share` allows, each with its part of the cores."""
-    per_card = floor(1 / share)
+    per_card = jobs_per_card(share)
     places = [(card, part) for card in cards for part in range(per_card)]
     return [
         Slot(
             f"card {card}" if per_card == 1 else f"card {card} part {part}",
             frozenset(cores[index :: len(places)] or cores),
-            {"CUDA_VISIBLE_DEVICES": card, **memory_share(share)},
+            {"CUDA_VISIBLE_DEVICES": card, **machine.gpu_share(os.environ, per_card)},
         )
         for index, (card, part) in enumerate(places)
     ]
 
 
-def memory_share(share: float) -> dict[str, str]:
-    """The variables of a job that has this share of a card; what the user has set wins."""
-    name = "XLA_PYTHON_CLIENT_MEM_FRACTION"
-    return {name: os.environ.get(name, f"{MEMORY_OF_A_CARD * share:.3f}")}
+def jobs_per_card(share: float) -> int:
+    """How many jobs with this share of a card it holds."""
+    return floor(1 / share)
 
 
 def cards() -> list[str]:

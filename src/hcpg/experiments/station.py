@@ -13,7 +13,8 @@ import hcpg
 from hcpg.experiments.claims import is_locked, locked
 from hcpg.experiments.local import stop, training
 from hcpg.experiments.parcels import Parcel, Stamp, land, pack
-from hcpg.experiments.slots import Slot, core_slots, memory_share, own_folder
+from hcpg.experiments.slots import Slot, core_slots, jobs_per_card, own_folder
+from hcpg.loops import machine
 from hcpg.report.records import find_runs
 
 SEND_S = 30.0
@@ -27,6 +28,14 @@ class StationError(RuntimeError):
     """A node that cannot do the job; the message says what to mend."""
 
 
+class Needs(NamedTuple):
+    """What a job takes of its node."""
+
+    cores: int
+    gpus: float
+    """Share of a card; 0 for training on cores."""
+
+
 class Order(NamedTuple):
     """What a station shall do."""
 
@@ -38,9 +47,7 @@ class Order(NamedTuple):
     """Where the output goes, likewise."""
     parcel: Parcel
     """The run folders to go on in, if any."""
-    cores: int
-    gpus: float
-    """Share of a card; 0 for training on cores."""
+    needs: Needs
 
 
 class News(NamedTuple):
@@ -74,12 +81,12 @@ class Station:
         self._root = self._scratch_folder()
         self._root.mkdir()
         land(order.parcel, self._root)
-        pack(self._root, find_runs(self._root), self._sent)  # what came from the launcher, it has
-        self._packed = time.monotonic(), self._checkpoints()
+        self._log = self._root / order.log
+        self._pack()  # what came from the launcher, it has
         self._process = training(
             order.words,
-            self._root / order.log,
-            self._slot(order),
+            self._log,
+            self._slot(order.needs),
             keep=self._locks,
             folder=self._root,
             leash=True,
@@ -89,15 +96,15 @@ class Station:
     def news(self) -> News:
         """What is new since the last call: a checkpoint at once, all else every `send_s` seconds."""
         code = self._process.poll()  # first: what it wrote last is then there to be sent
-        there, (packed_at, packed) = self._checkpoints(), self._packed
-        if code is None and there == packed and time.monotonic() < packed_at + self._send_s:
+        packed_at, packed = self._packed
+        is_due = self._checkpoints() != packed or time.monotonic() > packed_at + self._send_s
+        if code is None and not is_due:
             return News(platform.node(), None, Parcel({}, {}))
-        self._packed = time.monotonic(), there
-        return News(platform.node(), code, pack(self._root, find_runs(self._root), self._sent))
+        return News(platform.node(), code, self._pack())
 
-    def stop(self, at_once: bool) -> None:
-        """Let the training save and end, or kill it."""
-        stop(self._process, at_once=at_once)
+    def stop(self) -> None:
+        """Let the training save and end."""
+        stop(self._process, at_once=False)
 
     def close(self) -> None:
         """Delete the scratch folder, once the training has ended."""
@@ -116,15 +123,21 @@ class Station:
         self._locks.append(lock)
         return folder / "results"
 
-    def _slot(self, order: Order) -> Slot:
+    def _slot(self, needs: Needs) -> Slot:
         """Cores of this node that no other job has; left to the scheduler if there are not enough."""
         cores: set[int] = set()
         for each in core_slots(sorted(os.sched_getaffinity(0))):
-            if len(cores) < order.cores and (lock := each.take()) is not None:
+            if len(cores) < needs.cores and (lock := each.take()) is not None:
                 self._locks.append(lock)
                 cores |= each.cores
-        variables = memory_share(order.gpus) if order.gpus else {"JAX_PLATFORMS": "cpu"}
-        return Slot("node", frozenset(cores if len(cores) == order.cores else ()), variables)
+        variables = {"JAX_PLATFORMS": "cpu"}
+        if needs.gpus:
+            variables = machine.gpu_share(os.environ, jobs_per_card(needs.gpus))
+        return Slot("node", frozenset(cores if len(cores) == needs.cores else ()), variables)
+
+    def _pack(self) -> Parcel:
+        self._packed = time.monotonic(), self._checkpoints()
+        return pack(self._root, find_runs(self._root), [self._log], self._sent)
 
     def _checkpoints(self) -> set[Path]:
         return set(self._root.rglob("checkpoints/step_*"))
