@@ -75,6 +75,9 @@ def test_wandb_is_offline_whatever_the_environment_says(run, monkeypatch):
         tracker.log(100, {"train/loss": 0.5})
         tracker.log(200, {"train/loss": 0.125})
         tracker.close()
+    import wandb  # not before: it is the tracker that keeps it off the network
+
+    wandb.teardown()  # its service writes the file's end in its own time, at the latest when it ends
     file, records = offline_records(run.path)
     assert file.parent.name.startswith("offline-run-")
     started = next(record.run for record in records if record.HasField("run"))
