@@ -134,3 +134,13 @@ def test_a_selector_that_ranks_by_value_is_refused_for_a_method_without_critic(p
         UnservedSelectorError, match=r"'value_soft' .* 'sac_flow' has no .* hcpg, first, mean"
     ):
         presets.refuse_unserved(asking)
+
+
+def test_a_suites_discount_holds_for_every_method_and_its_temperature_where_there_is_one():
+    sac_flow, flowrl = (
+        presets.settings("maniskill/push-cube", name).learner for name in ("hcpg_flow", "flowrl")
+    )
+    assert (sac_flow.discount, sac_flow.initial_temperature) == (0.8, 0.01)
+    assert flowrl.discount == 0.8
+    assert not hasattr(flowrl, "initial_temperature")
+    assert presets.settings("metaworld/reach", "hcpg_flow").learner.discount == 0.97

@@ -191,6 +191,12 @@ PRESETS = {
     "sac_crossq": Preset("sac", ALONE, SAC_CROSSQ, {"cpu": CPU_SAC_CROSSQ}),
 }
 
+# ManiSkill's rewards lie in [0, 1] (Meta-World's reach 10) and its episodes have 50 steps: the discount is
+# that of its own baselines, and the temperature starts where entropy does not drown the reward
+# (docs/decisions.md).
+SUITES = {"maniskill": {"discount": 0.8, "initial_temperature": 0.01}}
+"""The learner's settings that follow from a suite, at every budget and for every method that has them."""
+
 BUDGETS = {
     "paper": Budget(
         "paper",
@@ -225,11 +231,13 @@ def settings(task: str, preset: str = "hcpg_flow", budget: str = "cpu") -> Setti
     chosen = _known("preset", preset, PRESETS)
     amount = _known("budget", budget, BUDGETS)
     config = registry.method(chosen.method).Config()
+    of_suite = SUITES.get(task.partition("/")[0], {})
+    served = {name: value for name, value in of_suite.items() if hasattr(config, name)}
     return Settings(
         task=task,
         preset=preset,
         method=chosen.method,
-        learner=replace(config, **{**chosen.learner, **chosen.overrides.get(budget, {})}),
+        learner=replace(config, **{**chosen.learner, **chosen.overrides.get(budget, {}), **served}),
         selector=chosen.selector,
         evaluation_selector=chosen.evaluation_selector or chosen.selector,
         adapter="paper",
