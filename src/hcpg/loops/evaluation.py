@@ -12,6 +12,7 @@ import numpy as np
 
 from hcpg.interfaces import Method, ReadScene
 from hcpg.loops import acting
+from hcpg.loops.batch_pool import open_pool
 from hcpg.loops.episodes import Episodes
 from hcpg.loops.pool import Pool
 from hcpg.loops.streams import EVALUATION_SEED, Stream, key
@@ -45,7 +46,7 @@ class Evaluator:
         """For each run, a row per episode: all with the selector, then all bare (or only `names`)."""
         if self._pool is None:
             seeds = [EVALUATION_SEED] * (self._slots * len(self._seeds))
-            self._pool = Pool(self._settings.task, seeds, workers=workers)
+            self._pool = open_pool(self._settings.task, seeds, workers=workers)
         rows: list[list[dict[str, Any]]] = [[] for _ in self._seeds]
         for name in self._policies if names is None else names:
             for first in range(0, self.episodes, self._slots):

@@ -21,7 +21,7 @@ import numpy as np
 
 from hcpg import registry
 from hcpg.loops.worker import NOBODY, Board, Post, Sizes, board_bytes, board_in, serve
-from hcpg.types import Bool, Float, Int, Spec, UInt8
+from hcpg.types import Bool, Float, Int, Spec, Tensor, UInt8
 
 GRACE_S = 5.0
 """How long `close` lets a worker finish its step before it is killed."""
@@ -36,9 +36,9 @@ class WorkerError(RuntimeError):
 class Arrival(NamedTuple):
     """What one step of all N environments brought."""
 
-    observations: Float[np.ndarray, "N O"]
+    observations: Float[Tensor, "N O"]
     """To act on next: after the reset where an episode ended."""
-    next_observations: Float[np.ndarray, "N O"]
+    next_observations: Float[Tensor, "N O"]
     """The true last observation of this step; equal to `observations` where no episode ended."""
     rewards: Float[np.ndarray, " N"]
     terminated: Bool[np.ndarray, " N"]
@@ -58,6 +58,8 @@ class Pool:
     """Number of environments, N."""
     timeout_s: float
     """How long an answer may take before a worker counts as hung."""
+    exact = True
+    """Whether the same start and actions bring the same observations, bit for bit."""
 
     def __init__(
         self,

@@ -10,6 +10,7 @@ from jax import numpy as jnp
 
 from hcpg import registry
 from hcpg.loops import acting, learning, memory, replay, streams
+from hcpg.loops.batch_pool import open_pool
 from hcpg.loops.episodes import Episodes
 from hcpg.loops.evaluation import Evaluator
 from hcpg.loops.journal import Journal
@@ -18,7 +19,8 @@ from hcpg.loops.runs_axis import stack, take
 from hcpg.loops.schedule import Schedule
 from hcpg.loops.streams import Stream
 from hcpg.presets import Settings
-from hcpg.types import Batch
+from hcpg.selection.arrays import namespace
+from hcpg.types import Batch, Tensor
 
 
 class Position(NamedTuple):
@@ -30,8 +32,8 @@ class Position(NamedTuple):
     """The method's states, with the run axis."""
     replay: replay.Replay
     episodes: Episodes
-    observations: np.ndarray
-    """[R * E, O], what to act on next."""
+    observations: Tensor
+    """[R * E, O], what to act on next; on the accelerator where the simulator is."""
     finite: Any
     """[R], whether every number of a run's state is finite."""
     wall_s: float
@@ -84,7 +86,7 @@ class Trainer:
     def pool(self) -> Pool:
         """The training environments: E of each run, with the run's own start states."""
         seeds = np.repeat(self.seeds, self.settings.budget.environments)
-        return Pool(self.settings.task, seeds.tolist(), workers=self.workers, horizon=self._horizon)
+        return open_pool(self.settings.task, seeds.tolist(), workers=self.workers, horizon=self._horizon)
 
     def empty(self) -> tuple[Any, replay.Replay]:
         """Fresh states and an empty replay, which also serve as templates for a checkpoint."""
@@ -177,9 +179,10 @@ class Trainer:
         return actions
 
     def _note_divergence(self, tick: int, position: Position, arrival: Arrival) -> None:
+        last = arrival.next_observations
         sound = {
             "reward": self._per_run(np.isfinite(arrival.rewards)).all(axis=1),
-            "observation": self._per_run(np.isfinite(arrival.next_observations)).all(axis=(1, 2)),
+            "observation": np.asarray(self._per_run(namespace(last).isfinite(last)).all(axis=(1, 2))),
             "state": np.asarray(position.finite),
         }
         for run in range(len(self.seeds)):
@@ -208,5 +211,5 @@ class Trainer:
         per_run = zip(self.seeds, self._per_run(numbers), strict=True)
         return np.concatenate([streams.start_states(seed, of) for seed, of in per_run])
 
-    def _per_run(self, rows: np.ndarray) -> np.ndarray:
+    def _per_run(self, rows: Tensor) -> Tensor:
         return rows.reshape(len(self.seeds), self.settings.budget.environments, *rows.shape[1:])

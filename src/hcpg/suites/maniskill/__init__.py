@@ -8,12 +8,14 @@ success ends an episode, which would make it worth less than being close to one,
 
 import difflib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
-from hcpg.interfaces import Environment, Task
+from hcpg.interfaces import Environment, EnvironmentBatch, Task
+from hcpg.suites.maniskill.batch import Address, ManiskillBatch
 from hcpg.suites.maniskill.building import build_simulation, renew_physics
 from hcpg.suites.maniskill.numpy_stepping import NumpyStepping
 from hcpg.suites.maniskill.pictures import Camera
@@ -78,6 +80,8 @@ class ManiskillSuite:
 
     stepping: Literal["numpy", "torch"] = "numpy"
     """Whose arithmetic makes a step, ours or ManiSkill's own; physics and numbers are the same."""
+    batch_backend: Literal["physx_cuda", "physx_cpu"] = "physx_cuda"
+    """What simulates a batch; the processor takes a batch of one, for tests."""
 
     def spec(self, task: Task) -> Spec:
         """The sizes of the task's observation and of its control mode's action."""
@@ -89,13 +93,24 @@ class ManiskillSuite:
         Raises:
             ValueError: there is no such task or control mode here, or the seed is not in [0, 2**20).
         """
-        if not 0 <= seed <= LARGEST_SEED:
-            raise ValueError(f"a seed of maniskill is an integer in [0, {LARGEST_SEED}], got {seed}")
+        _check_seed(seed)
         self.spec(task)
         simulation = build_simulation(task.env_id, control_mode(task))
         numpy = self.stepping == "numpy"
         stepping = NumpyStepping(simulation, task.env_id) if numpy else TorchStepping(simulation)
         return ManiskillEnvironment(task, seed, stepping)
+
+    def make_batch(self, task: Task, seeds: Sequence[int]) -> EnvironmentBatch:
+        """An environment for each seed, simulated together on a GPU.
+
+        Raises:
+            ValueError: as `make` does.
+        """
+        for seed in seeds:
+            _check_seed(seed)
+        self.spec(task)
+        address = Address(task.env_id, control_mode(task), self.batch_backend)
+        return ManiskillBatch(address, [seed * START_STATES for seed in seeds], START_STATES)
 
 
 SUITE = ManiskillSuite()
@@ -110,6 +125,11 @@ def control_mode(task: Task) -> str:
     mode = task.control.partition(":")[0]
     _known("control mode", mode, ACTION_SIZES)
     return mode
+
+
+def _check_seed(seed: int) -> None:
+    if not 0 <= seed <= LARGEST_SEED:
+        raise ValueError(f"a seed of maniskill is an integer in [0, {LARGEST_SEED}], got {seed}")
 
 
 def _known(kind: str, name: str, table: dict[str, int]) -> Any:

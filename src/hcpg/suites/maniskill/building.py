@@ -36,6 +36,22 @@ def build_stage(env_id: str, control_mode: str) -> Any:
     return _build(env_id, control_mode, nullcontext(), **_DRAWING)
 
 
+def build_batch(env_id: str, control_mode: str, backend: str, size: int) -> Any:
+    """One of ManiSkill's environments for `size` scenes at once, which draws nothing.
+
+    Args:
+        env_id: ManiSkill's name of the task.
+        control_mode: ManiSkill's name of what an action means.
+        backend: ManiSkill's name of what simulates, `physx_cuda` or `physx_cpu`.
+        size: how many scenes.
+
+    Raises:
+        RuntimeError: the backend is the processor's, which takes one scene, and `size` is more.
+    """
+    rest = {"num_envs": size, "sim_backend": backend, "render_backend": "none"}
+    return _build(env_id, control_mode, _no_colours(), **rest)
+
+
 def renew_physics(simulation: Any) -> None:
     """Put all bodies of a simulation that draws nothing into a new scene of the physics engine.
 
@@ -55,7 +71,7 @@ def renew_physics(simulation: Any) -> None:
     scene.sub_scenes[0], scene.px = new, physics
 
 
-def _build(env_id: str, control_mode: str, building: AbstractContextManager, **rendering: Any) -> Any:
+def _build(env_id: str, control_mode: str, building: AbstractContextManager, **rest: Any) -> Any:
     with warnings.catch_warnings(), _only_errors_logged():
         warnings.simplefilter("ignore")  # of the package's own use of logging, NumPy and the Vulkan loader
         importlib.import_module("mani_skill.envs")
@@ -63,12 +79,10 @@ def _build(env_id: str, control_mode: str, building: AbstractContextManager, **r
         environment_class = registration.REGISTERED_ENVS[env_id].cls
         with building:
             return environment_class(
-                num_envs=1,
                 obs_mode="state",
                 reward_mode="normalized_dense",
                 control_mode=control_mode,
-                sim_backend="physx_cpu",
-                **rendering,
+                **({"num_envs": 1, "sim_backend": "physx_cpu"} | rest),
             )
 
 
