@@ -18,7 +18,8 @@ from hcpg.report.durable import replace_file
 from hcpg.report.page.content import Request, content
 from hcpg.report.records import Group
 
-SCRIPTS = ("dom", "tables", "results", "curves", "contrasts", "origins", "media", "page")
+STYLES = ("ground", "controls", "tables", "curves", "media")
+SCRIPTS = ("dom", "tables", "results", "numbers", "curves", "contrasts", "origins", "media", "page")
 """In the order in which they use each other."""
 
 
@@ -40,7 +41,7 @@ def html_page(shown: Mapping[str, Any], plain: str) -> str:
     Raises:
         ValueError: a number is not finite (JSON has no word for it).
     """
-    style = _asset("page.css")
+    style = "\n".join(_asset(f"{name}.css") for name in STYLES)
     # A function of its own: its names must not meet the browser's.
     script = "\n".join(["(() => {", *(_asset(f"{name}.js") for name in SCRIPTS), "})();"])
     policy = (
