@@ -26,17 +26,21 @@ class Method(Protocol):
 
     def init(self, key: Tensor) -> Any:
         """Everything that learning changes, fresh."""
+        ...
 
     def propose(
         self, state: Any, observation: Float[Tensor, " O"], key: Tensor, count: int
     ) -> Float[Tensor, "K A"]:
         """`count` candidate actions in [-1, 1], independent in all their noise."""
+        ...
 
     def act(self, state: Any, observation: Float[Tensor, " O"], key: Tensor) -> Float[Tensor, " A"]:
         """The method's own evaluation action, in [-1, 1]."""
+        ...
 
     def update(self, state: Any, batch: Batch, key: Tensor) -> tuple[Any, Metrics]:
         """One learning step on a batch of B transitions; it never sees a selector."""
+        ...
 
 
 @runtime_checkable
@@ -47,6 +51,7 @@ class Valued(Protocol):
         self, state: Any, observation: Float[Tensor, " O"], actions: Float[Tensor, "K A"]
     ) -> Float[Tensor, " K"]:
         """The pessimistic critic's value of each action."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -76,15 +81,19 @@ class Environment(Protocol):
 
         A finite suite of start states wraps around.
         """
+        ...
 
     def step(self, action: Float[Tensor, " A"]) -> Step:
         """The answer to one action in [-1, 1]; it never reports a time limit."""
+        ...
 
     def render(self) -> UInt8[Tensor, "H W 3"]:
         """The scene as an RGB picture."""
+        ...
 
     def close(self) -> None:
         """Free the simulator; safe to call twice."""
+        ...
 
 
 @runtime_checkable
@@ -93,6 +102,7 @@ class Suite(Protocol):
 
     def spec(self, task: Task) -> Spec:
         """The task's sizes, without building the simulator where they are known."""
+        ...
 
     def make(self, task: Task, seed: int) -> Environment:
         """An environment whose start states are the set that `seed` names.
@@ -100,6 +110,7 @@ class Suite(Protocol):
         Two environments made with one seed have equal start states; sets of different seeds are
         disjoint (that is how evaluation stays apart from training).
         """
+        ...
 
 
 @runtime_checkable
@@ -108,9 +119,11 @@ class Clock(Protocol):
 
     def now_s(self) -> float:
         """Seconds since an arbitrary moment; never goes back."""
+        ...
 
     def sleep_until(self, time_s: float) -> None:
         """Return at `time_s` or as soon after it as possible; at once if it has passed."""
+        ...
 
 
 @runtime_checkable
@@ -124,10 +137,12 @@ class Robot(Protocol):
     @property
     def limits(self) -> Limits:
         """What it may do, set in the robot's own file."""
+        ...
 
     @property
     def clock(self) -> Clock:
         """The clock of all its times. A twin in this process waits by running its physics."""
+        ...
 
     def connect(self, timeout_s: float) -> Info:
         """Connect (again), check what must hold before motion, hold still; a new epoch begins.
@@ -135,21 +150,27 @@ class Robot(Protocol):
         Raises:
             RobotError: no answer, or a check that failed; the message says which and the cure.
         """
+        ...
 
     def observe(self) -> Snapshot:
         """The newest state at once, however old: it never waits for the robot."""
+        ...
 
     def command(self, command: Command) -> Ack:
         """Move the target there, unless the command is old, or lies outside the box or the lead."""
+        ...
 
     def hold(self) -> None:
         """Make the measured position the target, once: further calls, or any after a stop, do nothing."""
+        ...
 
     def stop(self, reason: str) -> None:
         """Stop for good: hold, refuse whatever comes, end the motion. A new epoch begins."""
+        ...
 
     def recover(self, timeout_s: float) -> Recovery:
         """Clear a reflex and hold where the arm is now; a new epoch begins, whatever was queued is gone."""
+        ...
 
     def reset(self, position: tuple[float, float, float], grip: Grip, timeout_s: float) -> None:
         """Move slowly to a start pose (m) and hold there; a new epoch begins.
@@ -157,9 +178,11 @@ class Robot(Protocol):
         Raises:
             RobotError: it did not get there in time, or a reflex stopped it.
         """
+        ...
 
     def close(self) -> None:
         """Stop and let the connection go; safe to call twice."""
+        ...
 
 
 @runtime_checkable
@@ -169,12 +192,15 @@ class Perception(Protocol):
     @property
     def age_limit_s(self) -> float:
         """A sighting older than this is not to be acted on."""
+        ...
 
     def look(self, snapshot: Snapshot, now_s: float) -> Sight:
         """The newest sightings at once, each with its age; it never waits for a camera."""
+        ...
 
     def forget(self) -> None:
         """Drop what was seen of things that move: the scene was laid out anew."""
+        ...
 
 
 @runtime_checkable
@@ -183,9 +209,11 @@ class Stage(Protocol):
 
     def arrange(self, start: int) -> None:
         """Lay out start state `start`, any integer >= 0; the same layout every time. The arm is at home."""
+        ...
 
     def close(self) -> None:
         """Let go of what it uses; safe to call twice."""
+        ...
 
 
 @runtime_checkable
@@ -194,6 +222,7 @@ class Detector(Protocol):
 
     def update(self, snapshot: Snapshot, sight: Sight) -> bool:
         """Whether the task is done, after one more tick."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -228,6 +257,7 @@ class RobotPlugin(Protocol):
     @property
     def kind(self) -> Kind:
         """Whether a real arm moves."""
+        ...
 
     def make(self, task: str, address: str | None) -> Rig:
         """A rig for the task `suite/name`, not connected yet; `address` is its controller's, if it has one.
@@ -235,6 +265,7 @@ class RobotPlugin(Protocol):
         Raises:
             RobotError: this robot cannot do the task, or lacks its driver; the message says the cure.
         """
+        ...
 
 
 @runtime_checkable
@@ -243,14 +274,17 @@ class EnvironmentBatch(Protocol):
 
     def reset(self, starts: Int[Tensor, " N"]) -> Float[Tensor, "N O"]:
         """The first observations of start state `starts[n]` of each environment n."""
+        ...
 
     def step(
         self, actions: Float[Tensor, "N A"]
     ) -> tuple[Float[Tensor, "N O"], Float[Tensor, " N"], Bool[Tensor, " N"]]:
         """Observations, rewards and successes; it never reports a time limit, and no task ends by itself."""
+        ...
 
     def close(self) -> None:
         """Free the simulator; safe to call twice."""
+        ...
 
 
 @runtime_checkable
@@ -259,3 +293,4 @@ class BatchedSuite(Protocol):
 
     def make_batch(self, task: Task, seeds: Sequence[int]) -> EnvironmentBatch:
         """Environment n with the start states that `seeds[n]` names, the same ones that `make` gives it."""
+        ...
