@@ -21,7 +21,7 @@ def tag(name="drawer", offset_m=(0.0, 0.0, 0.0)):
 
 def errors_mm(finder, seed):
     placed = []
-    for number, (position, rotation) in enumerate(poses(10, seed)):
+    for number, (position, rotation) in enumerate(poses(6, seed)):
         found = finder.find(picture({3: (position, rotation)}, seed=number))
         placed.append(1000 * np.abs(found["drawer"] - position))
     return np.median(placed, axis=0)
