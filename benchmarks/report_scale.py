@@ -1,6 +1,7 @@
 """Time and memory of `hcpg report` on generated runs, each with all the rows that the cpu budget writes."""
 
 import argparse
+import itertools
 import json
 import resource
 import subprocess
@@ -8,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +20,15 @@ METHODS = ("sac", "flowrl", "qsm", "sac_flow", "hcpg_flow")
 SEEDS = 20
 TRAINING_EPISODES = 120
 """Of 500 steps in 60,000."""
-LINE = (
+HEAD = (
     '{{"step": {step}, "phase": "{phase}", "selector": "{selector}", "adapter": "paper", '
-    '"environment": {place}, "start": {start}, "success_once": {success}, "success_at_end": {success}, '
-    '"steps_to_success": {first}, "return": {value:.13f}, "length": 500}}\n'
+    '"environment": {place}, "start": {start}, '
 )
+TAILS = tuple(
+    f'"success_once": {success}, "success_at_end": {success}, "steps_to_success": {first}, "return": '
+    for success, first in (("false", -1), ("true", 100))
+)
+"""Of a failure and of a success."""
 METRICS = 100
 """Rows of a run's `metrics.jsonl`."""
 PACKAGES = 200
@@ -50,31 +56,27 @@ def generate(root: Path, runs: int) -> int:
 
 def _lines(random: np.random.Generator, budget: presets.Budget) -> Iterator[str]:
     """Training episodes, then evaluations with a selector and bare, as the loops write them."""
-    for step in range(0, budget.steps, budget.steps // TRAINING_EPISODES):
-        yield _line(step, "train", "hcpg", int(random.integers(2**31)), random.random(2))
-    for number in range(1, budget.evaluations + 1):
-        step, level = (
-            number * budget.steps // budget.evaluations,
-            random.random() * number / budget.evaluations,
-        )
-        for selector in ("hcpg", "bare"):
-            for start in range(budget.evaluation_episodes):
-                yield _line(step, "evaluation", selector, start, random.random(2) / (level, 1))
+    heads, shares = zip(*_heads(budget), strict=True)
+    successes = random.random(len(heads)) < np.array(shares) * random.random()
+    returns = 1e4 * random.random(len(heads))
+    for head, success, value in zip(heads, successes.tolist(), returns.tolist(), strict=True):
+        yield f'{head}{TAILS[success]}{value}, "length": 500}}\n'
 
 
-def _line(step: int, phase: str, selector: str, start: int, draws: np.ndarray) -> str:
-    """A success where the first draw is less than 1; the second makes the return."""
-    success = draws[0] < 1
-    return LINE.format(
-        step=step,
-        phase=phase,
-        selector=selector,
-        place=start % 8,
-        start=start,
-        success="true" if success else "false",
-        first=100 if success else -1,
-        value=1e4 * draws[1],
-    )
+@cache
+def _heads(budget: presets.Budget) -> list[tuple[str, float]]:
+    """How every line of a run begins, and the share of the training before it."""
+    heads = []
+    for number in range(TRAINING_EPISODES):
+        share, start = number / TRAINING_EPISODES, 1_000_003 * number
+        facts = {"phase": "train", "selector": "hcpg", "place": number % 8, "start": start}
+        heads.append((HEAD.format(step=round(share * budget.steps), **facts), share))
+    for number, selector in itertools.product(range(1, budget.evaluations + 1), ("hcpg", "bare")):
+        share = number / budget.evaluations
+        for start in range(budget.evaluation_episodes):
+            facts = {"phase": "evaluation", "selector": selector, "place": start % 8, "start": start}
+            heads.append((HEAD.format(step=round(share * budget.steps), **facts), share))
+    return heads
 
 
 def _parts(folder: Path, settings: presets.Settings, seed: int) -> None:
