@@ -113,3 +113,15 @@ def test_what_the_twin_lacks_is_refused_by_name():
         suite.make(replace(task, env_id="door"), 0)
     with pytest.raises(ValueError, match="got -1"):
         suite.make(task, -1)
+
+
+def test_a_picture_shows_the_ball_where_it_is():
+    environment = registry.suite("franka").make(registry.task("franka/rugby-grasp"), seed=100)
+    environment.reset(0)
+    picture = environment.render().astype(int)
+    assert picture.shape == (480, 480, 3)
+    red, green, blue = np.moveaxis(picture, -1, 0)
+    orange = (red > 120) & (red > 1.6 * green) & (red > 2.5 * blue)
+    assert 300 < orange.sum() < 5000
+    environment.close()
+    environment.close()

@@ -4,9 +4,7 @@ An episode sees what it would see on the arm: a touched-off or a photographed po
 noisy and with gaps; its reward is for what is true. Every number made here is a number of the twin.
 """
 
-import importlib
-import os
-from typing import Any
+import atexit
 
 import numpy as np
 
@@ -14,6 +12,7 @@ from hcpg.interfaces import Environment, RobotTask, Task
 from hcpg.perception.truth import NoisyTruth, Poorness
 from hcpg.robot_types import Sight, Sighting, Snapshot
 from hcpg.safety.limiting import Limited, Motion, limit, unfit
+from hcpg.twin.drawing import Drawing
 from hcpg.twin.experts import Moment, act
 from hcpg.twin.judging import Truth
 from hcpg.twin.limits import limits
@@ -27,7 +26,6 @@ NEAR_M = 0.1
 LOOKED_S = 0.5
 """Perception has been looking for so long when an episode begins."""
 PICTURE_PIXELS = 480
-CAMERA = "side"
 
 
 class FrankaEnvironment:
@@ -37,7 +35,7 @@ class FrankaEnvironment:
         self._robot, self._seed = robot, seed
         self._limits = limits(task.env_id)
         self._world = World(task.env_id, seed)
-        self._renderer: Any = None
+        self._drawing: Drawing | None = None
         self.reset(0)
 
     def reset(self, start: int) -> Float[np.ndarray, " O"]:
@@ -73,19 +71,23 @@ class FrankaEnvironment:
         return act(self._world.task, moment, speed)
 
     def render(self) -> UInt8[np.ndarray, "H W 3"]:
-        """The table from the side."""
-        if self._renderer is None:
-            os.environ.setdefault("MUJOCO_GL", "egl")
-            mujoco: Any = importlib.import_module("mujoco")
-            self._renderer = mujoco.Renderer(self._world.physics.model, PICTURE_PIXELS, PICTURE_PIXELS)
-        self._renderer.update_scene(self._world.physics.data, CAMERA)
-        return self._renderer.render().copy()
+        """The table from the side; works without a display.
+
+        Raises:
+            DrawingError: a library for OpenGL is missing.
+        """
+        if self._drawing is None:
+            self._drawing = Drawing(self._world.physics.model, PICTURE_PIXELS)
+            # Left to the interpreter's end, a context outlives the library that it frees itself with.
+            atexit.register(self.close)
+        return self._drawing.picture(self._world.physics.data)
 
     def close(self) -> None:
-        """Free the renderer, where one was opened; safe to call twice."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        """Free what draws, where it was opened; safe to call twice."""
+        if self._drawing is not None:
+            self._drawing.close()
+            self._drawing = None
+            atexit.unregister(self.close)
 
     def _motion(self) -> Motion:
         return Motion(self._target, TICK_S, self._running_s)

@@ -84,19 +84,22 @@ class Listener:
         self._thread.start()
 
     def arrange(self, start: int) -> None:
-        """Have start state `start` laid out, as soon as the arm is clear of the things.
+        """Have start state `start` laid out; where the arm is in the way, that comes later.
 
         Raises:
             RobotError: the twin does not take the request up.
         """
         ticket = next(self._tickets) + time.monotonic_ns()
-        until_s = time.monotonic() + ASKING_S
+        until_s, told = time.monotonic() + ASKING_S, {}
         while time.monotonic() < until_s:
             self._ask(Request(ticket, start)._asdict())
             time.sleep(2 * POLL_S)
-            if self._facts(KNOWN_S).get("ticket") == ticket:
+            told = self._facts(KNOWN_S)
+            if told.get("ticket") == ticket and not told["waiting"]:
                 return
-        raise RobotError(f"the twin at {self._address[0]} lays out nothing; is it running? See `make twin`")
+        if told.get("ticket") != ticket:
+            cure = "is it running? See `make twin`"
+            raise RobotError(f"the twin at {self._address[0]} lays out nothing; {cure}")
 
     def truth(self) -> Truth:
         """What is true there.
