@@ -17,10 +17,10 @@ def test_every_run_of_a_protocol_could_be_trained(name):
 def test_all_methods_of_a_table_get_the_same_budget_adapter_discount_and_seeds_on_a_task(name):
     settings = protocol(name).settings()
     assert {each.adapter for each in settings} == {"contact" if name.startswith("contact") else "paper"}
+    assert len({each.budget for each in settings}) == 1
     for task in protocol(name).tasks:
         on_task = [each for each in settings if each.task == task]
         assert [each.preset for each in on_task] == list(protocol(name).presets)
-        assert len({each.budget for each in on_task}) == 1
         assert len({each.learner.discount for each in on_task}) == 1
     seeds = {}
     for cell in protocol(name).cells():
@@ -65,9 +65,10 @@ def test_the_control_arms_are_in_a_table_of_each_suite():
     [
         ("metaworld_paper", "metaworld/door-open", 1_000_000, 1, 50_000),
         ("maniskill_paper", "maniskill/pick-cube", 1_000_000, 32, 50_000),
-        ("maniskill_paper", "maniskill/poke-cube", 500_000, 32, 25_000),
+        ("maniskill_paper", "maniskill/poke-cube", 1_000_000, 32, 50_000),
         ("maniskill", "maniskill/pick-cube", 300_000, 8, 5_000),
-        ("maniskill", "maniskill/push-cube", 60_000, 8, 5_000),
+        ("maniskill", "maniskill/push-cube", 300_000, 8, 5_000),
+        ("controls", "metaworld/drawer-open", 60_000, 8, 5_000),
     ],
 )
 def test_the_budget_of_a_task(name, task, steps, environments, warmup_steps):

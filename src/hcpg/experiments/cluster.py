@@ -170,7 +170,7 @@ def _join(address: str, deadline: float) -> None:
 
 def _knock(address: str) -> None:
     """Fail at once where nobody listens at HOST:PORT; Ray itself would wait for minutes."""
-    host, _, port = address.removeprefix("ray://").rpartition(":")
+    host, _, port = address.rpartition(":")
     if host and port.isdigit():
         socket.create_connection((host, int(port)), timeout=PATIENCE_S).close()
 

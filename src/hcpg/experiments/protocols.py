@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 from hcpg import presets, registry
 from hcpg.presets import ARMS, Settings
 
-Changes = Mapping[str, Any]
-
 METAWORLD = tuple(
     f"metaworld/{name}"
     for name in ("button-press", "door-open", "drawer-open", "lever-pull", "peg-insert-side", "sweep-into")
@@ -22,19 +20,11 @@ ABLATED = tuple(f"maniskill/{name}" for name in ("pick-cube", "push-cube", "pull
 CONTROLLED = tuple(f"metaworld/{name}" for name in ("drawer-open", "button-press", "door-open"))
 BASELINES = ("sac", "flowrl", "qsm", "sac_flow")
 
-# ManiSkill's own recipe for training from states: 32 environments, one update for two steps, discount 0.8,
-# a million steps for PickCube and half of that for the easier tasks; warm-up is 5 % of the steps.
-MANISKILL_LEARNER = {"discount": 0.8}
-MANISKILL_PAPER = {
-    "steps": 500_000,
-    "environments": 32,
-    "updates_per_step": 0.5,
-    "warmup_steps": 25_000,
-    "evaluation_episodes": 16,
-}
-MANISKILL_STEPS = {
-    "paper": {"maniskill/pick-cube": {"steps": 1_000_000, "warmup_steps": 50_000}},
-    "cpu": {f"maniskill/{name}": {"steps": 300_000} for name in ("pick-cube", "poke-cube")},
+# As ManiSkill trains from states: 32 environments, one update for two steps; and the paper's 16 episodes per
+# evaluation. One length for all tasks of a table, PickCube's: it is the slowest to learn.
+MANISKILL_CHANGES = {
+    "paper": {"environments": 32, "updates_per_step": 0.5, "evaluation_episodes": 16},
+    "cpu": {"steps": 300_000},
 }
 
 
@@ -51,7 +41,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class Protocol:
-    """Every preset on every task with the same seeds; all presets get the same budget on a task."""
+    """Every preset on every task, with the same seeds and budget."""
 
     title: str
     tasks: tuple[str, ...]
@@ -59,12 +49,8 @@ class Protocol:
     seeds: tuple[int, ...] = (0, 1, 2)
     budget: str = "cpu"
     adapter: str = "paper"
-    changes: Changes = field(default_factory=dict)
+    changes: Mapping[str, Any] = field(default_factory=dict)
     """Values of the budget that differ from the named one."""
-    task_changes: Mapping[str, Changes] = field(default_factory=dict)
-    """Further ones of single tasks, which go before `changes`."""
-    learner: Changes = field(default_factory=dict)
-    """Values of the learner that are the same for all presets, whatever theirs are."""
 
     def settings(self) -> list[Settings]:
         """One for each task and preset, in the order of the table."""
@@ -76,13 +62,7 @@ class Protocol:
 
     def _settings(self, task: str, preset: str) -> Settings:
         usual = presets.settings(task, preset, self.budget)
-        changes = {**self.changes, **self.task_changes.get(task, {})}
-        return replace(
-            usual,
-            adapter=self.adapter,
-            learner=replace(usual.learner, **self.learner),
-            budget=replace(usual.budget, **changes),
-        )
+        return replace(usual, adapter=self.adapter, budget=replace(usual.budget, **self.changes))
 
 
 def _metaworld(
@@ -94,16 +74,8 @@ def _metaworld(
 
 def _maniskill(title: str, tasks: tuple[str, ...], names: tuple[str, ...]) -> dict[str, Protocol]:
     return {
-        budget: Protocol(
-            title,
-            tasks,
-            names,
-            budget=budget,
-            changes=MANISKILL_PAPER if budget == "paper" else {},
-            task_changes={task: each for task, each in MANISKILL_STEPS[budget].items() if task in tasks},
-            learner=MANISKILL_LEARNER,
-        )
-        for budget in ("cpu", "paper")
+        budget: Protocol(title, tasks, names, budget=budget, changes=changes)
+        for budget, changes in MANISKILL_CHANGES.items()
     }
 
 
