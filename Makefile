@@ -22,7 +22,8 @@ demo: install ## Train hcpg_flow and sac_flow side by side on a Meta-World task 
 twin: install ## Make the environment of the served twin, .venv-twin, and add the arm's driver to .venv
 	@"$(ROOT)/scripts/install_twin.sh"
 
-test: ## Run the tests (14 minutes on 2 cores; under 10 is the aim)
+test: ## Run the tests
+	@"$(ROOT)/scripts/install_system_packages.sh" sapien opengl vulkan browser
 	@"$(ROOT)/scripts/install.sh" run test
 	@cd "$(ROOT)" && $(TEST_SETTINGS) $(PYTHON_OF_PROJECT) -m pytest -n 2 --dist loadfile $(ARGS)
 
