@@ -11,9 +11,10 @@ from tiny_cells import cell
 from hcpg.experiments import cluster, engine
 from hcpg.experiments.claims import is_locked
 from hcpg.experiments.cluster import ClusterError, RayCluster, _jobs_on
-from hcpg.experiments.engine import run
+from hcpg.experiments.engine import LOST, run
 from hcpg.experiments.ledger import entries, newest_checkpoint
 from hcpg.experiments.station import Needs
+from hcpg.experiments.units import units
 from hcpg.loops import sitting
 from hcpg.loops.runs import RunFolder
 
@@ -106,6 +107,26 @@ def test_an_experiment_loses_a_node_and_ends_with_the_undisturbed_results(
     while any(is_locked(lock) for lock in own.rglob("jobs/*/lock")):
         assert time.monotonic() < deadline
         time.sleep(0.1)
+
+
+def test_a_job_that_waits_for_a_node_and_one_that_is_killed_both_end(nodes, tmp_path):
+    made, _, _ = nodes
+    place = RayCluster(made.address, Needs(1, 0.0))
+    found = units(entries([cell(seed, steps=100_000) for seed in (0, 1)], tmp_path), together=False)
+    begun, waiting = (place.start(unit, tmp_path, []) for unit in found)
+    assert not place.room()  # the head alone is left
+    while begun.place == "the cluster":
+        assert begun.poll() is None
+        time.sleep(0.05)
+    assert waiting.place == "the cluster"
+    for job, at_once in ((waiting, False), (begun, True)):
+        job.stop(at_once=at_once)
+        while (code := job.poll()) is None:
+            time.sleep(0.05)
+        assert code == LOST
+        assert "killed" in (tmp_path / job._log).read_text()
+    assert place.room()
+    place.close()
 
 
 def test_a_job_that_no_node_can_hold_is_refused(nodes):

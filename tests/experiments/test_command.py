@@ -68,6 +68,19 @@ def test_the_status_tells_done_running_failed_and_left_and_the_time_at_the_prese
     claim.close()
 
 
+def test_less_than_an_hour_is_told_in_minutes(small, tmp_path, capsys):
+    cells = small.cells()
+    steps = cells[0].settings.budget.steps
+    for each in cells[:3]:
+        folder = create(each, tmp_path / "small")
+        folder.append("metrics", [{"step": steps, "wall_s": 720.0}])
+        folder.set_status("finished")
+    assert cli.main(["experiment", "status", "small", "--out", str(tmp_path), "--cores", "1"]) == 0
+    assert (
+        capsys.readouterr().out.splitlines()[-1] == "3 finished, 1 left, about 12 minutes left, 1 at a time"
+    )
+
+
 def test_a_complete_experiment_is_reported_and_other_seeds_can_be_asked_for(
     small, stand_in, tmp_path, capsys
 ):

@@ -145,4 +145,5 @@ def _time_left(entries: list[ledger.Entry], cores: int) -> str:
     hours = hours_left(entries, running or cores)
     if hours is None:
         return ", time left unknown before a run has learned for a while"
-    return f", about {hours:.1f} hours left, {running or cores} at a time"
+    time = f"{hours:.1f} hours" if hours >= 1 else f"{60 * hours:.0f} minutes"
+    return f", about {time} left, {running or cores} at a time"
