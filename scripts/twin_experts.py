@@ -24,6 +24,9 @@ from hcpg.loops.control.sessions import Session
 from hcpg.robots.twin import START_SEED
 from hcpg.safety.priority import raise_priority
 from hcpg.selection import Selector
+from hcpg.tasks.franka import below_tcp
+from hcpg.tasks.franka.button_press import FINGERTIP_M
+from hcpg.tasks.franka.peg_insertion import PEG_TIP_M
 from hcpg.twin.experts import Moment, act
 from hcpg.twin.launching import served
 from hcpg.twin.scenes import SCENES
@@ -36,12 +39,14 @@ def session(task: str, address: str | None, speed: float, log: Path) -> Session:
     """A session in which the expert proposes, by the truth that the twin's stage knows."""
     name = f"franka/{task}"
     rig: Any = registry.robot("twin").make(name, address)
+    tip_m = PEG_TIP_M if task == "peg-insertion" else FINGERTIP_M
     facts, robot_task = registry.task(name), registry.robot_task(name)
 
     def propose(observation: np.ndarray, count: int, draw: int) -> np.ndarray:
         truth = rig.stage.truth()
         tool, width_m = np.asarray(observation[:3], np.float64), 0.08 * float(observation[10])
-        moment = Moment(tool, truth.tip, truth.object, truth.goal, width_m)
+        tip = np.asarray(below_tcp(observation, tip_m), np.float64)
+        moment = Moment(tool, tip, truth.object, truth.goal, width_m)
         return np.tile(act(task, moment, speed), (count, 1))
 
     chooser = Chooser(propose, ALONE, facts.adapters["paper"], robot_task.action_size, 0)

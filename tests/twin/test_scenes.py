@@ -1,9 +1,13 @@
 """The scenes against numbers from elsewhere: the FR3's published DH table and what the docstrings promise."""
 
+import json
+import subprocess
+
 import numpy as np
 import pytest
 
 from hcpg.twin.bodies import HOME_ANGLES, Addresses, angles_for
+from hcpg.twin.launching import PYTHON, is_installed
 from hcpg.twin.scenes import SCENES, build, layout, scene
 
 mujoco = pytest.importorskip("mujoco")
@@ -123,3 +127,21 @@ def test_a_layout_follows_from_its_two_numbers():
 def test_an_unknown_task_is_named_with_those_there_are():
     with pytest.raises(ValueError, match="no task 'peg'; it has peg-insertion, button-press"):
         scene("peg")
+
+
+@pytest.mark.skipif(not is_installed(), reason="the served twin's environment is missing: run `make twin`")
+def test_the_served_twins_older_mujoco_builds_the_same_scenes(models):
+    code = (
+        "import json, mujoco, numpy\n"
+        "from hcpg.twin.scenes import SCENES, build\n"
+        "models = {task: build(each, 0.002) for task, each in SCENES.items()}\n"
+        "told = lambda m: [m.nq, m.ngeom, float(m.body_mass.sum()), float(m.jnt_range.sum())]\n"
+        "facts = {task: told(model) for task, model in models.items()}\n"
+        "print(json.dumps([mujoco.__version__, numpy.__version__, facts]))"
+    )
+    told = subprocess.run([str(PYTHON), "-c", code], capture_output=True, text=True, check=True)
+    of_mujoco, of_numpy, facts = json.loads(told.stdout)
+    assert (of_mujoco, of_numpy) == ("3.2.7", "1.26.4")
+    for task, model in models.items():
+        ours = [model.nq, model.ngeom, model.body_mass.sum(), model.jnt_range.sum()]
+        assert facts[task] == pytest.approx(ours, rel=1e-9)
