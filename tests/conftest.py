@@ -5,8 +5,11 @@ thread holds for the processes started from here, so for the workers of `pytest 
 """
 
 import os
+import sys
 from pathlib import Path
 
+import psutil
+import pytest
 from hypothesis import settings
 
 _CACHE = Path(__file__).parents[1] / ".cache"
@@ -29,3 +32,13 @@ os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
 # The same examples on every machine: a failure seen once is seen again. No deadline: the first call compiles.
 settings.register_profile("hcpg", derandomize=True, deadline=None, database=None)
 settings.load_profile("hcpg")
+
+_MUCH_MEMORY_BYTES = 2 << 30
+
+
+@pytest.fixture(autouse=True, scope="module")
+def forget_programs():
+    """Compiled programs are kept for one file's tests; those of all files would fill a small machine."""
+    yield
+    if "jax" in sys.modules and psutil.Process().memory_info().rss > _MUCH_MEMORY_BYTES:
+        sys.modules["jax"].clear_caches()
