@@ -18,6 +18,8 @@ from hcpg.experiments.units import units
 from hcpg.loops import sitting
 from hcpg.loops.runs import RunFolder
 
+# Ray starts its servers by a fork that becomes another program at once, of which JAX warns.
+pytestmark = pytest.mark.filterwarnings(r"ignore:os.fork\(\) was called:RuntimeWarning")
 LENGTH = {"steps": 1000, "evaluations": 5}
 
 
