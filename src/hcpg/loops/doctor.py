@@ -206,9 +206,7 @@ def vulkan(environment: Mapping[str, str] = os.environ) -> Finding:
         return _finding("vulkan", "warning", f"ManiSkill cannot start: {answer.line}", cure)
     draws = not answer.line.startswith("none:")
     value = answer.line if draws else f"{answer.line}. ManiSkill trains here all the same, without videos"
-    cure = (
-        "For videos: sudo scripts/install_system_packages.sh vulkan (Mesa 24 or newer), or a GPU's driver"
-    )
+    cure = "For videos: sudo scripts/install_system_packages.sh vulkan (Mesa 24 or newer), or a GPU's driver"
     return _finding("vulkan", draws or "warning", value, cure)
 
 
