@@ -109,9 +109,9 @@ def test_an_unseeded_reset_of_the_package_draws_from_pytorchs_generator_and_ours
 
 def test_numpys_generator_is_not_moved_either(make):
     np.random.seed(3)  # noqa: NPY002 - the generator under test
-    before = np.random.get_state()  # noqa: NPY002
+    before = np.random.get_state()  # noqa: NPY002 - the generator under test
     make("pick-cube").reset(0)
-    after = np.random.get_state()  # noqa: NPY002
+    after = np.random.get_state()  # noqa: NPY002 - the generator under test
     assert np.array_equal(before[1], after[1])
     assert before[2:] == after[2:]
 

@@ -81,15 +81,15 @@ def test_episodes_repeat_bit_for_bit_whatever_came_before(drawer):
 
 def test_the_global_generator_is_neither_moved_nor_asked():
     np.random.seed(3)  # noqa: NPY002 - the generator under test
-    before = np.random.get_state()  # noqa: NPY002
+    before = np.random.get_state()  # noqa: NPY002 - the generator under test
     environment = suite.SUITE.make(DRAWER, seed=81)
     first = environment.reset(0)
     environment.step(np.zeros(4, np.float32))
-    after = np.random.get_state()  # noqa: NPY002
+    after = np.random.get_state()  # noqa: NPY002 - the generator under test
     assert np.array_equal(before[1], after[1])
     assert before[2:] == after[2:]
     suite._start_states.cache_clear()
-    np.random.seed(4)  # noqa: NPY002
+    np.random.seed(4)  # noqa: NPY002 - the generator under test
     assert np.array_equal(suite.SUITE.make(DRAWER, seed=81).reset(0), first)
 
 

@@ -1,6 +1,5 @@
 """ManiSkill's adapters against the simulator: what the observation holds, and what greedy motion achieves."""
 
-import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -9,32 +8,8 @@ import pytest
 from hcpg import registry
 from hcpg.tasks.maniskill import poke_cube
 
-ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def make():
-    """Environments by task, each made once."""
-    made = {}
-
-    def environment(name):
-        if name not in made:
-            task = registry.task(f"maniskill/{name}")
-            made[name] = registry.suite("maniskill").make(task, seed=0)
-        return made[name]
-
-    yield environment
-    for each in made.values():
-        each.close()
-
-
-@pytest.fixture(scope="module")
-def controls():
-    """The script with the two controls, as a module."""
-    spec = importlib.util.spec_from_file_location("adapter_check", ROOT / "scripts/adapter_check.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+SUITE = "maniskill"
+SCRIPTS = Path(__file__).parents[2] / "scripts"
 
 
 def point(pose):
@@ -121,7 +96,7 @@ def test_the_papers_gate_opens_above_the_cube_and_its_lift_goes_past_the_goal(ma
 
 
 def test_the_picture_shows_the_gate_and_both_directions(make, controls, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "scripts")
+    monkeypatch.syspath_prepend(SCRIPTS)
     import adapter_pictures
 
     task = registry.task("maniskill/push-cube")

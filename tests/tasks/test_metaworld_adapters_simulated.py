@@ -1,8 +1,5 @@
 """The adapters against the simulator: layout, axes, experts, and what greedy motion achieves."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -25,34 +22,9 @@ UNTURNED = {
     "sweep-into": [0, 0, 0, 1],
     "peg-insert-side": [0, 0, 0, 1],
 }
-ROOT = Path(__file__).parents[2]
+SUITE = "metaworld"
 # The package's own experts ask for more than the actions' range, and say so.
 pytestmark = pytest.mark.filterwarnings("ignore:Constant.* may be too high")
-
-
-@pytest.fixture(scope="module")
-def make():
-    """Environments by task, each made once."""
-    made = {}
-
-    def environment(name):
-        if name not in made:
-            task = registry.task(f"metaworld/{name}")
-            made[name] = registry.suite("metaworld").make(task, seed=0)
-        return made[name]
-
-    yield environment
-    for each in made.values():
-        each.close()
-
-
-@pytest.fixture(scope="module")
-def controls():
-    """The script with the two controls, as a module."""
-    spec = importlib.util.spec_from_file_location("adapter_check", ROOT / "scripts/adapter_check.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def active(scene):

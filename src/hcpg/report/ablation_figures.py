@@ -10,7 +10,7 @@ from hcpg.report.bars import seeds_last_five
 from hcpg.report.paper_tables import task_name
 from hcpg.report.records import Group
 from hcpg.report.statistics import spread
-from hcpg.report.styles import COLUMN_IN, blank, drawing, styles_of
+from hcpg.report.styles import COLUMN_IN, Style, blank, drawing, styles_of
 from hcpg.types import Float
 
 if TYPE_CHECKING:
@@ -84,8 +84,7 @@ def candidates_figure(groups: Sequence[Group]) -> "Figure":
         figure = blank(COLUMN_IN, 2.1)
         axes = figure.subplots()
         for (task, style), shift in zip(styles_of(tasks).items(), _shifts(len(tasks)), strict=True):
-            look = {"color": style.color, "marker": style.marker, "label": task_name(task)}
-            _task(axes, by_task[task], shift, look)
+            _task(axes, by_task[task], shift, style, task_name(task))
         complete = [count for count in counts if all(count in own for own in by_task.values())]
         means = [np.mean([by_task[task][count].mean() for task in tasks]) for count in complete]
         axes.plot(np.log2(complete), means, color="black", linewidth=1.8, label="mean over tasks", zorder=2)
@@ -104,7 +103,7 @@ def _shifts(count: int) -> Float[np.ndarray, " N"]:
 
 
 def _task(
-    axes: "Axes", seeds: Mapping[int, Float[np.ndarray, " S"]], shift: float, look: Mapping[str, object]
+    axes: "Axes", seeds: Mapping[int, Float[np.ndarray, " S"]], shift: float, style: Style, label: str
 ) -> None:
     counts = sorted(seeds)
     spreads = [spread(seeds[count]) for count in counts]
@@ -117,7 +116,9 @@ def _task(
         linestyle=":",
         markersize=4,
         capsize=2,
-        **look,  # type: ignore[arg-type]  # colour, marker and label
+        color=style.color,
+        marker=style.marker,
+        label=label,
     )
     for place, count in zip(places, counts, strict=True):
         _dots(axes, np.full(len(seeds[count]), place), seeds[count])

@@ -95,9 +95,9 @@ def drawing() -> Iterator[None]:
         MissingExtraError: matplotlib is not installed.
     """
     require("matplotlib", "plots")
-    from matplotlib import rc_context
+    from matplotlib import RcParams, rc_context
 
-    with rc_context(_RC):  # type: ignore[arg-type]  # the stub names keys only by a Literal
+    with rc_context(RcParams(_RC)):
         yield
 
 
@@ -105,8 +105,9 @@ def blank(width_in: float, height_in: float) -> "Figure":
     """An empty figure of exactly that size, laid out so that nothing overlaps."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02)  # type: ignore[union-attr, call-arg]  # constrained
+    layout = ConstrainedLayoutEngine(w_pad=0.02, h_pad=0.02)
+    figure = Figure(figsize=(width_in, height_in), layout=layout)
     FigureCanvasAgg(figure)
     return figure

@@ -71,7 +71,9 @@ def test_text_from_the_runs_stays_text(desktop):
 
 
 def test_tables_are_sorted_by_a_click_on_their_headings_and_by_keyboard(desktop):
-    first = lambda: [row[0].split()[0] for row in rows(desktop, MAIN)]  # noqa: E731
+    def first():
+        return [row[0].split()[0] for row in rows(desktop, MAIN)]
+
     head = desktop.locator(f"{MAIN} >> th", has_text="HCPG-Flow")
     assert first() == ["DrawerOpen", "Reach"]
     sort(desktop, MAIN, "HCPG-Flow")
@@ -122,6 +124,7 @@ def test_curves_are_read_under_the_pointer_and_by_the_arrow_keys(desktop):
     box = stage.bounding_box()
     readout = stage.locator(".readout")
     desktop.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60)
+    expect(readout).to_be_visible()
     assert readout.inner_text().split()[:5] == ["300", "steps", "HCPG-Flow", "60.0", "±"]
     assert "SAC-Flow 50.0 ± 70.7" in " ".join(readout.inner_text().split())
     desktop.mouse.move(0, 0)
@@ -158,14 +161,17 @@ def test_the_manifest_lists_the_runs_when_it_is_opened(desktop):
     runs = desktop.locator("#manifest details", has_text="8 runs")
     assert runs.locator("tbody tr").count() == 0
     runs.locator("summary").click()
-    assert runs.locator("tbody tr").count() == 8
+    # The browser tells of the opening only after the click has returned.
+    expect(runs.locator("tbody tr")).to_have_count(8)
     runs.get_by_role("searchbox").fill("reach")
-    assert runs.locator("tbody tr").count() == 2
+    expect(runs.locator("tbody tr")).to_have_count(2)
     assert "point/reach/hcpg_flow/s1/a" in runs.inner_text()
 
 
 def test_the_theme_is_chosen_by_the_reader(desktop):
-    ground = lambda: desktop.evaluate("getComputedStyle(document.body).backgroundColor")  # noqa: E731
+    def ground():
+        return desktop.evaluate("getComputedStyle(document.body).backgroundColor")
+
     assert ground() == "rgb(245, 246, 248)"
     for scheme in ("light", "dark"):
         desktop.get_by_role("button", name="Theme").click()
