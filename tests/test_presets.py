@@ -70,7 +70,9 @@ def test_hcpg_flow_blends_four_and_sac_flow_takes_the_only_one():
 def test_the_other_fields_differ_from_sac_flow_in_the_field_alone(velocity, budget):
     plain = presets.settings("point/carry", "sac_flow", budget)
     chosen = presets.settings("point/carry", f"sac_flow_{velocity}", budget)
-    assert chosen.learner == replace(plain.learner, velocity=velocity)
+    # The published plain field does not act as it learns (docs/baselines.md): at `cpu` it is mended.
+    mended = {"plain_norm": "per_step"} if (velocity, budget) == ("plain", "cpu") else {}
+    assert chosen.learner == replace(plain.learner, velocity=velocity, **mended)
     assert chosen.selector == plain.selector
 
 

@@ -26,6 +26,7 @@ VARIANTS = {
     "crossq": {},
     "polyak": {"critic": "polyak"},
     "plain": {"velocity": "plain"},
+    "plain, norm per step": {"velocity": "plain", "plain_norm": "per_step", "flow_steps": 2},
     "decoder": {"velocity": "decoder", "flow_steps": 2},
 }
 BATCH = transitions(ROWS, OBSERVATIONS, ACTIONS)
@@ -119,7 +120,9 @@ def test_the_actor_update_equals_the_one_in_torch(case):
         moments = torch_fields.at(case.after.actor_moments, place)
         np.testing.assert_allclose(moments.mean, mean, atol=1e-5)
         np.testing.assert_allclose(moments.variance, variance, atol=1e-5)
-        once = case.method.config.velocity == "decoder" and place[0] != "layers"
+        config = case.method.config
+        once = place[0] in ("observation", "samples") and config.velocity == "decoder"
+        once = once or config.plain_norm == "per_step"
         assert int(moments.calls) == (1 if once else case.method.config.flow_steps)
     assert len(reference.extra["statistics"]) == len(jax.tree.leaves(case.after.actor_moments)) / 3
 
@@ -203,8 +206,14 @@ def test_the_published_density_is_refused_for_fields_whose_density_is_right():
         Config(velocity="plain", density="as_published")
 
 
+def test_a_norm_per_step_is_refused_for_fields_that_have_no_shared_one():
+    with pytest.raises(ValueError, match=r"'plain's alone, not that of 'gated': choose"):
+        Config(plain_norm="per_step")
+
+
 def test_the_defaults_are_the_official_recipe():
     config = Config()
+    assert config.plain_norm == "shared"
     assert (config.critic, config.flow_steps, config.policy_delay) == ("crossq", 4, 3)
     assert (config.velocity, config.density, config.decoder_hidden_size) == ("gated", "corrected", 96)
     assert (config.actor_learning_rate, config.critic_learning_rate) == (3e-4, 1e-3)

@@ -41,5 +41,4 @@ def test_the_other_fields_learn_to_reach(preset, tmp_path):
     found = trained("point/reach", preset, tmp_path, learner, steps=8000, evaluations=4)
     curve = [successes(found[step, "bare"]) for step in (2000, 4000, 6000, 8000)]
     assert curve[0] <= 5, curve  # of 20
-    # Between them they are worth 9 to 20 successes here: the plain field's seeds differ widely.
-    assert max(curve[2:]) >= max(8, curve[0] + 4), curve
+    assert max(curve[2:]) >= 12, curve

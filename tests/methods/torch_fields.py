@@ -86,7 +86,8 @@ def gated(actor, norms, observations, sample, clock):
 
 def plain(actor, norms, observations, sample, clock):
     times = torch.full((len(sample), 1), clock[0] / clock[1], dtype=torch.float64)
-    inputs = norms(actor.norm, ("inputs",), torch.cat([observations, sample, times], dim=-1))
+    place = clock[0] if len(actor.norms) > 1 else 0
+    inputs = norms(actor.norms[place], ("inputs", place), torch.cat([observations, sample, times], dim=-1))
     hidden = torch.relu(dense(actor.second, torch.relu(dense(actor.first, inputs))))
     return dense(actor.velocity, hidden), bounded(dense(actor.deviation, hidden))
 

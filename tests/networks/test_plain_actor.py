@@ -33,17 +33,19 @@ def observations():
 def test_four_steps_are_four_calls_of_the_one_norm(actor, observations, noise):
     """The observation's mean moves as if seen four times; the time's is .01 (.75 + .99/2 + .99^2/4)."""
     _, after = train(actor, actor.moments(), observations, noise)
-    assert int(after.inputs.calls) == 4
+    assert int(after.inputs[0].calls) == 4
     mean = np.asarray(observations).mean(axis=0)
-    np.testing.assert_allclose(after.inputs.mean[:OBSERVATIONS], mean * (1 - 0.99**4), rtol=1e-4, atol=1e-7)
-    np.testing.assert_allclose(after.inputs.mean[-1], 0.01490025, rtol=1e-5)
-    np.testing.assert_allclose(after.inputs.variance[-1], 0.99**4, rtol=1e-5)
+    np.testing.assert_allclose(
+        after.inputs[0].mean[:OBSERVATIONS], mean * (1 - 0.99**4), rtol=1e-4, atol=1e-7
+    )
+    np.testing.assert_allclose(after.inputs[0].mean[-1], 0.01490025, rtol=1e-5)
+    np.testing.assert_allclose(after.inputs[0].variance[-1], 0.99**4, rtol=1e-5)
 
 
 def test_in_training_the_time_is_the_norms_bias_alone(actor, observations, noise):
     """With a bias of zero, what weighs the time changes nothing while learning, and a lot while acting."""
     louder = eqx.tree_at(lambda actor: actor.first.kernel, actor, actor.first.kernel.at[-1].add(3.0))
-    moments = PlainMoments(actor.moments().inputs._replace(mean=jnp.full(9, 0.375)))
+    moments = PlainMoments([actor.moments().inputs[0]._replace(mean=jnp.full(9, 0.375))])
     learning = [train(each, moments, observations, noise)[0].actions for each in (actor, louder)]
     acting = [infer(each, moments, observations, noise).actions for each in (actor, louder)]
     np.testing.assert_allclose(*learning, atol=1e-4)
@@ -95,3 +97,18 @@ def test_the_parameters_are_those_of_the_published_network():
     """Observation 10, action 4, width 512: norm 30, layers 16 x 512 and 513 x 512, two heads of 513 x 4."""
     actor = PlainActor.create(jax.random.key(0), (10, 4), 512)
     assert sum(leaf.size for leaf in jax.tree.leaves(actor)) == 30 + 16 * 512 + 513 * 512 + 2 * 513 * 4
+
+
+def test_a_norm_for_each_step_acts_by_the_moments_it_learned_by(observations, noise):
+    """After many calls with one batch, acting on it is what training did; with one norm it is not."""
+    apart = {}
+    for norms in (1, STEPS):
+        actor = PlainActor.create(jax.random.key(0), (OBSERVATIONS, ACTIONS), 8, norms)
+        moments = actor.moments()
+        for _ in range(1500):  # 0.99^1500 is below 3e-7
+            path, moments = train(actor, moments, observations, noise)
+        acted = infer(actor, moments, observations, noise)
+        apart[norms] = float(abs(path.actions - acted.actions).max())
+        assert [int(each.calls) for each in moments.inputs] == [1500 * STEPS // norms] * norms
+    assert apart[STEPS] < 1e-4
+    assert apart[1] > 0.1

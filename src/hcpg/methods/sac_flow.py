@@ -30,6 +30,8 @@ class Config:
 
     velocity: Literal["gated", "decoder", "plain"] = "gated"
     """gated: Flow-G. decoder: Flow-T. plain: the naive flow, which has no gate."""
+    plain_norm: Literal["shared", "per_step"] = "shared"
+    """shared: one input norm for all flow steps, as published. per_step: one for each (plain only)."""
     density: Literal["corrected", "as_published"] = "corrected"
     """as_published: the path's density leaves out the deviation of the steps (decoder only)."""
     critic: Literal["crossq", "polyak"] = "crossq"
@@ -62,15 +64,21 @@ class Config:
     """Share of the online critics mixed into their targets at each update (polyak only)."""
 
     def __post_init__(self) -> None:
-        """Refuse a combination that no code published.
+        """Refuse a setting that would change nothing, or what no code published.
 
         Raises:
-            ValueError: `density` is as_published for a field whose published density is right.
+            ValueError: `density` is as_published for a field whose published density is right, or
+                `plain_norm` is set for another field.
         """
         if self.density == "as_published" and self.velocity != "decoder":
             raise ValueError(
                 f"density 'as_published' is the velocity 'decoder's alone, not that of {self.velocity!r}: "
                 "choose velocity 'decoder', or density 'corrected'"
+            )
+        if self.plain_norm == "per_step" and self.velocity != "plain":
+            raise ValueError(
+                f"plain_norm 'per_step' is the velocity 'plain's alone, not that of {self.velocity!r}: "
+                "choose velocity 'plain', or plain_norm 'shared'"
             )
 
 
@@ -128,7 +136,8 @@ class SACFlow:
             case "gated":
                 return GatedActor.create(key, sizes, config.actor_hidden_size)
             case "plain":
-                return PlainActor.create(key, sizes, config.actor_hidden_size)
+                norms = 1 if config.plain_norm == "shared" else config.flow_steps
+                return PlainActor.create(key, sizes, config.actor_hidden_size, norms)
             case "decoder":
                 size, steps = config.decoder_hidden_size, config.flow_steps
                 return DecoderActor.create(key, sizes, size, steps, config.density)
