@@ -46,11 +46,19 @@ def test_a_run_in_a_population_gives_the_numbers_it_gives_alone(tmp_path):
     for name in brought[0]:
         np.testing.assert_allclose(brought[2][name], brought[0][name], atol=1e-5, err_msg=name)
     learned = [arrays(folder, "state") for folder in (alone, *population)]
+    # An input that never changes is taken out by its norm, whatever the scale: that entry's gradient is of
+    # rounding errors alone, of which Adam makes steps of the learning rate. Here these are the height of the
+    # object on the table and whether it is held, and two norms see them.
+    idle = np.flatnonzero(np.ptp(brought[0]["['observations']"], axis=0) == 0)
+    assert idle.tolist() == [6, 10]
+    scales = {".actor.field.observation_norm.scale", ".critic.networks.norms[0].scale"}
     for name in learned[0]:
-        # An input that never changes gives its norm's scale a gradient of rounding errors alone, and Adam
-        # makes of any gradient a step of the learning rate, 0.001.
-        tolerance = 1e-2 if name.endswith("scale") else 1e-5
-        np.testing.assert_allclose(learned[2][name], learned[0][name], atol=tolerance, err_msg=name)
+        own, beside = (
+            np.delete(learned[place][name], idle, axis=-1) if name in scales else learned[place][name]
+            for place in (0, 2)
+        )
+        np.testing.assert_allclose(beside, own, atol=1e-5, err_msg=name)
+    assert scales <= learned[0].keys()
     assert max(np.abs(learned[1][name] - learned[0][name]).max() for name in learned[0]) > 0.1
     for own, beside in zip(alone.rows("episodes"), population[1].rows("episodes"), strict=True):
         assert beside == own | {"return": pytest.approx(own["return"], rel=1e-4)}
