@@ -5,12 +5,11 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
 from hcpg import registry
-from hcpg.interfaces import Rig
+from hcpg.commands.arms import announced, arm_action, with_priority
 from hcpg.loops.control import drill_table
 from hcpg.loops.control.choosing import Chooser
 from hcpg.loops.control.drill import Outcome, drill
@@ -20,10 +19,7 @@ from hcpg.loops.control.records import EpisodeResult
 from hcpg.loops.control.sessions import Session
 from hcpg.loops.control.step_log import plain
 from hcpg.loops.control.watching import Watched, watch
-from hcpg.loops.control.workers import passes_by_itself
 from hcpg.registry import UnknownNameError
-from hcpg.robot_types import Limits
-from hcpg.safety.priority import raise_priority
 from hcpg.selection import RULES, Selector
 
 STEPS = "steps.jsonl"
@@ -37,7 +33,7 @@ def run(arguments: Sequence[str]) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     """0 where the robot is ready."""
-    rig = _announced(options)
+    rig = announced(options)
     with closing(rig.stage):
         seen = watch(rig.robot, options.seconds)
     sys.stdout.writelines(f"{line}\n" for line in _watched_lines(seen, options.seconds))
@@ -48,7 +44,7 @@ def _check(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """0 where every episode was run, 128 + the signal where one stopped it, else 1."""
-    rig, task = _announced(options), registry.robot_task(options.task)
+    rig, task = announced(options), registry.robot_task(options.task)
     address = registry.task(options.task)
     selector = Selector(rule=options.selector, candidates=options.candidates)
     propose = partial(uniform, options.seed, task.action_size)
@@ -90,33 +86,11 @@ def _drilled(options: argparse.Namespace, name: str) -> Outcome:
     folder = options.out / name
     folder.mkdir(parents=True, exist_ok=False)
     plugin = registry.robot(options.robot)
-    rig = _with_priority(plugin.make(options.task, options.address))
+    rig = with_priority(plugin.make(options.task, options.address))
     read_scene = registry.task(options.task).adapters["paper"]
     task = registry.robot_task(options.task)
     with closing(rig.stage):
         return drill(rig, plugin.kind, task, read_scene, FAULTS[name], folder)
-
-
-def _announced(options: argparse.Namespace) -> Rig:
-    """The rig that the options name; says what it is and what it is held to."""
-    plugin = registry.robot(options.robot)
-    registry.robot_task(options.task)  # a task that no arm does is refused before any driver loads
-    rig = plugin.make(options.task, options.address)
-    sys.stdout.write(f"{options.robot} ({plugin.kind}), {options.task}; limits:\n")
-    sys.stdout.writelines(f"  {line}\n" for line in _limit_lines(rig.robot.limits))
-    return _with_priority(rig)
-
-
-def _with_priority(rig: Rig) -> Rig:
-    """The rig, and this process before ordinary ones, if the robot's time does not wait for it."""
-    refused = raise_priority() if passes_by_itself(rig.robot.clock) else ""
-    sys.stdout.write(f"{refused}\n" if refused else "")
-    return rig
-
-
-def _limit_lines(limits: Limits) -> Iterator[str]:
-    width = max(map(len, asdict(limits)))
-    return (f"{name:{width}}  {value}" for name, value in asdict(limits).items())
 
 
 def _watched_lines(seen: Watched, seconds: float) -> Iterator[str]:
@@ -148,10 +122,10 @@ def _parser() -> argparse.ArgumentParser:
         description="An arm at 30 Hz, or its twin. Limits are on unless the robot's file says so.",
     )
     actions = parser.add_subparsers(required=True, metavar="check | run | drill")
-    check = _action(actions, "check", _check, "connect, check, hold still, let go")
+    check = arm_action(actions, "check", _check, "connect, check, hold still, let go")
     check.add_argument("--seconds", type=float, default=2.0, help="how long to hold; default: 2")
     check.add_argument("--out", type=Path, metavar="FILE", help="what was found, as JSON")
-    play = _action(actions, "run", _run, "episodes of random proposals with a selector")
+    play = arm_action(actions, "run", _run, "episodes of random proposals with a selector")
     play.add_argument("--selector", choices=RULES, default="hcpg")
     play.add_argument("--candidates", type=int, default=4, help="proposals per action (K); default: 4")
     play.add_argument("--adapter", default="paper", help="scene reader; default: paper")
@@ -160,19 +134,8 @@ def _parser() -> argparse.ArgumentParser:
     play.add_argument("--horizon", type=int, help="most actions of an episode; default: the task's")
     play.add_argument("--seed", type=int, default=0, help="of the proposals; default: 0")
     play.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where the steps are written")
-    faults = _action(actions, "drill", _drill, "inject faults into a twin and tell what happened")
+    faults = arm_action(actions, "drill", _drill, "inject faults into a twin and tell what happened")
     faults.add_argument("--fault", nargs="*", help=f"some of: {', '.join(FAULTS)}; default: all")
     faults.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new folder")
     faults.add_argument("--into", type=Path, metavar="FILE", help="a document with a place for the table")
-    return parser
-
-
-def _action(
-    actions: "argparse._SubParsersAction", name: str, carry_out: object, what: str
-) -> argparse.ArgumentParser:
-    parser = actions.add_parser(name, help=what, description=what)
-    parser.add_argument("task", metavar="TASK", help="as `hcpg list tasks` has it")
-    parser.add_argument("--robot", required=True, help=f"one of: {', '.join(registry.names('robots'))}")
-    parser.add_argument("--address", help="the controller's, where the robot has one")
-    parser.set_defaults(carry_out=carry_out)
     return parser
