@@ -79,5 +79,5 @@ def test_an_empty_picture_has_nothing():
 
 def test_without_opencv_the_cure_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(RobotError, match="pip install opencv-python"):
+    with pytest.raises(RobotError, match=r"pip install 'hcpg-flow\[tags\]'"):
         TagFinder(calibration(t3=tag()))

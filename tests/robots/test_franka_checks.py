@@ -78,7 +78,7 @@ def test_the_arm_refuses_what_it_cannot_do(task, address, message, monkeypatch):
 
 def test_without_its_driver_the_arm_says_what_to_install(monkeypatch):
     monkeypatch.setattr(franka, "has_driver", lambda: False)
-    with pytest.raises(RobotError, match=r"pip install franky-control==2\.0\.0"):
+    with pytest.raises(RobotError, match=r"pip install 'hcpg-flow\[franka\]'"):
         registry.robot("franka").make("franka/peg-insertion", "172.16.0.2")
 
 

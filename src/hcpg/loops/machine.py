@@ -30,7 +30,7 @@ def workers_per_run(processes: int) -> int:
 def core_for(index: int, processes: int) -> set[int] | None:
     """The core that process `index` of so many shall keep to; None where there are more cores than processes.
 
-    Left to the scheduler, three learners on two cores took 3.5 times the time of one, kept to a core each 2.6
+    Left to the scheduler, three learners on two cores took 3.5 times the time of one, kept to a core each 2.9
     (docs/evidence/speed).
     """
     allowed = sorted(os.sched_getaffinity(0))

@@ -92,5 +92,5 @@ def _opencv() -> Any:
     try:
         import cv2
     except ImportError as error:
-        raise RobotError("AprilTags need OpenCV: pip install opencv-python") from error
+        raise RobotError("AprilTags need OpenCV: pip install 'hcpg-flow[tags]'") from error
     return cv2

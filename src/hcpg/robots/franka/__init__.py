@@ -52,7 +52,7 @@ class FrankaRobot:
         if address == "localhost" or address.startswith("127."):
             raise RobotError(f"{address} is this machine, so what answers is a twin; use --robot twin")
         if not has_driver():
-            raise RobotError("the driver is missing; install it: pip install franky-control==2.0.0")
+            raise RobotError("the driver is missing; install it: pip install 'hcpg-flow[franka]'")
         eyes = Calibrated.read(POSITIONS, _objects(task))
         return Rig(FrankaArm(address, task_limits(task), ARM), eyes, Person())
 
