@@ -20,7 +20,7 @@ import numpy as np
 from jax.tree_util import keystr, tree_flatten_with_path, tree_map_with_path
 from safetensors.numpy import load_file, save_file
 
-from hcpg.report.durable import replace_json, sync_file, sync_folder
+from hcpg.report.durable import json_digest, replace_json, sync_file, sync_folder
 
 PyTree = Any
 FORMAT = 1
@@ -59,7 +59,7 @@ def save(
     writing.mkdir(parents=True)
     files = {name: _write_tree(writing / f"{name}.safetensors", tree) for name, tree in trees.items()}
     document = {"format": FORMAT, "step": step, "facts": dict(facts), "files": files}
-    replace_json(writing / "facts.json", {**document, "sha256": _digest(document)})
+    replace_json(writing / "facts.json", {**document, "sha256": json_digest(document)})
     _publish(writing, target)
     _prune(folder, target, keep)
     return target
@@ -184,15 +184,9 @@ def _document(path: Path) -> dict[str, Any] | None:
         document = json.loads(file.read_bytes())
     except ValueError:
         return None
-    if not isinstance(document, dict) or document.pop("sha256", None) != _digest(document):
+    if not isinstance(document, dict) or document.pop("sha256", None) != json_digest(document):
         return None
     return document
-
-
-def _digest(document: Mapping[str, Any]) -> str:
-    # Through JSON once, so that tuples and number keys hash as they will be read back.
-    plain = json.loads(json.dumps(document, allow_nan=False))
-    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
 def _file_digest(path: Path) -> str:

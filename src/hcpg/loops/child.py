@@ -44,7 +44,7 @@ def work(job: Job, workers: int, log: Path, pipe: Connection) -> None:
 
     JAX is imported once the environment variables are in place.
     """
-    _redirect_output(log)
+    redirect_output(log)
     programs = open_programs(os.environ)
     talk = _Talk(pipe, programs)
     obey_parent(talk.stop.set)
@@ -53,7 +53,7 @@ def work(job: Job, workers: int, log: Path, pipe: Connection) -> None:
     except Exception as error:  # whatever it is, the parent reports it; the traceback stays in the log
         traceback.print_exc()
         for seed in job.seeds:
-            talk.tell(Message("failed", seed, {"error": _as_text(error)}))
+            talk.tell(Message("failed", seed, {"error": as_text(error)}))
         sys.exit(1)
     finally:
         if programs is not None:
@@ -103,8 +103,8 @@ class _Talk:
         self.stop.set()
 
 
-def _redirect_output(log: Path) -> None:
-    """Also what XLA writes from C++ goes into the log, not across the parent's live view."""
+def redirect_output(log: Path) -> None:
+    """Send all output of this process, also what XLA writes from C++, into the file `log`."""
     log.parent.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     for standard in (1, 2):
@@ -112,7 +112,7 @@ def _redirect_output(log: Path) -> None:
     os.close(descriptor)
 
 
-def _as_text(error: Exception) -> str:
-    """Our own errors speak for themselves; another one needs its type."""
+def as_text(error: Exception) -> str:
+    """An error in words: our own speak for themselves, another one needs its type."""
     ours = type(error).__module__.startswith("hcpg.")
     return str(error) if ours else f"{type(error).__name__}: {error}"

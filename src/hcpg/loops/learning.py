@@ -1,7 +1,6 @@
 """Updates of all runs in one jitted call: sample, learn, repeat; buffers are donated."""
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -10,14 +9,18 @@ from jax import numpy as jnp
 from jaxtyping import Array, Bool, Float, Key
 
 from hcpg.interfaces import Method
-from hcpg.loops.replay import Replay, sample
+from hcpg.loops.replay import Draw, drawing
 from hcpg.loops.runs_axis import axes_of, over_runs
 
 Learn = Callable[..., tuple[Any, dict[str, Float[Array, " R"]], Bool[Array, " R"]]]
 
 
-def compiled(method: Method, state_type: type, runs: int, updates: int, batch_size: int) -> Learn:
+def compiled(
+    method: Method, state_type: type, runs: int, updates: int, batch_size: int, draw: Draw | None = None
+) -> Learn:
     """`updates` learning steps: (states, replay, sampling keys [R], learning keys [R]).
+
+    Batches come from `draw`; None draws them from a `Replay` as the method wants them.
 
     Gives the states, the metrics and whether every number of a run's state is still finite. Metrics are
     means over the updates that report them: what a delayed update leaves out is NaN, and is NaN in the
@@ -26,13 +29,12 @@ def compiled(method: Method, state_type: type, runs: int, updates: int, batch_si
     axes = axes_of(state_type)
     update = over_runs(method.update, runs, (axes, 0, 0), (axes, 0))
     finite = over_runs(is_finite, runs, (axes,))
-    draw_one = partial(sample, batch_size=batch_size, sampling=method.sampling)
-    draw = over_runs(draw_one, runs, (0, None, 0))
+    batch_of = draw or drawing(runs, batch_size, method.sampling)
     fold = jax.vmap(jax.random.fold_in, in_axes=(0, None))
 
-    def learn(states: Any, replay: Replay, sampling: Key[Array, " R"], learning: Key[Array, " R"]) -> tuple:
+    def learn(states: Any, replay: Any, sampling: Key[Array, " R"], learning: Key[Array, " R"]) -> tuple:
         def body(states: Any, _: None) -> tuple[Any, dict[str, Array]]:
-            batch = draw(replay.transitions, replay.inserted, fold(sampling, states.updates))
+            batch = batch_of(replay, fold(sampling, states.updates))
             return update(states, batch, fold(learning, states.updates))
 
         states, history = jax.lax.scan(body, states, length=updates)

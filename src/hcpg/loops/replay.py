@@ -1,13 +1,19 @@
 """A ring of transitions per run, kept on the device and sampled inside the learner's scan."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 from jax import numpy as jnp
-from jaxtyping import Array, Int, PRNGKeyArray
+from jaxtyping import Array, Int, Key, PRNGKeyArray
 
+from hcpg.loops.runs_axis import over_runs
 from hcpg.types import Batch, Sampling, Spec
+
+Draw = Callable[[Any, Key[Array, " R"]], Batch]
+"""(what is learned from, keys [R]) -> a batch [R, B, ...]."""
 
 
 class Replay(NamedTuple):
@@ -63,6 +69,35 @@ def sample(
         uniform = jax.random.randint(of_all, (batch_size - recent,), 0, filled)
         rows = jnp.concatenate([uniform, (inserted - ages) % capacity])
     return jax.tree.map(lambda ring: ring[rows], transitions)
+
+
+def drawing(runs: int, batch_size: int, sampling: Sampling) -> Draw:
+    """Batches of one ring, for all runs."""
+    one = partial(sample, batch_size=batch_size, sampling=sampling)
+    every = over_runs(one, runs, (0, None, 0))
+    return lambda replay, keys: every(replay.transitions, replay.inserted, keys)
+
+
+class Halves(NamedTuple):
+    """Two rings that a batch takes half of each from."""
+
+    demonstrations: Replay
+    online: Replay
+
+
+def drawing_halves(runs: int, batch_size: int, sampling: Sampling) -> Draw:
+    """Batches of `Halves`: the demonstrations' rows come first."""
+    sizes = (batch_size // 2, batch_size - batch_size // 2)
+    draws = [drawing(runs, size, sampling) for size in sizes]
+
+    def draw(halves: Halves, keys: Key[Array, " R"]) -> Batch:
+        both = jax.vmap(jax.random.split)(keys)
+        parts = [
+            each(ring, both[:, place]) for place, (each, ring) in enumerate(zip(draws, halves, strict=True))
+        ]
+        return jax.tree.map(lambda *rows: jnp.concatenate(rows, axis=1), *parts)
+
+    return draw
 
 
 def filled_part(replay: Replay, run: int) -> dict[str, np.ndarray]:

@@ -27,6 +27,7 @@ class Stream(IntEnum):
     LEARNING = 5
     STARTS = 6
     EVALUATION = 7
+    CLONING = 8
 
 
 def key(seed: int, stream: Stream) -> PRNGKeyArray:

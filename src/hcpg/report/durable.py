@@ -1,5 +1,6 @@
 """Files that a crash leaves either as they were or as they shall be, never in between."""
 
+import hashlib
 import json
 import os
 from pathlib import Path
@@ -26,6 +27,16 @@ def replace_json(path: Path, value: Any) -> None:
     """
     text = json.dumps(value, indent=2, allow_nan=False)
     replace_file(path, text.encode() + b"\n")
+
+
+def json_digest(value: Any) -> str:
+    """The SHA-256 of a value that JSON can hold, the same for what is read back of it.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    plain = json.loads(json.dumps(value, allow_nan=False))  # tuples and number keys as they will come back
+    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
 def sync_file(path: Path) -> None:

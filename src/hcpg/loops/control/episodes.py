@@ -22,6 +22,8 @@ POLICY_SHARE = 0.8
 """Part of a period within which the policy has to answer; what is left is for limits and the command."""
 PATIENCE_S = 1.0
 """Held for so much longer than it may act, an episode ends."""
+DRAWS_PER_EPISODE = 1_000_000
+"""The draw of a tick is the episode's number times this, plus the tick's: no two of a run share one."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ class Episode:
 
     def _acted(self, record: StepRecord) -> tuple[StepRecord, Exception | None]:
         """The record with what was chosen and became of it; what the policy raised, if it did."""
-        draw = self._number * 1_000_000 + record.tick.number  # no two ticks of a session share one
+        draw = self._number * DRAWS_PER_EPISODE + record.tick.number
         choose = partial(self._crew.chooser.choose, record.observation, draw, record.verdict.alone)
         if not self._crew.worker.ask(draw, choose):
             return _not_done(record, "the policy is busy with an earlier tick"), None

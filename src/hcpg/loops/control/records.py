@@ -1,8 +1,8 @@
 """What an episode leaves behind: one record per tick, and how it ended."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -82,7 +82,32 @@ class Transition(NamedTuple):
     """In the state it led to."""
 
 
-def transitions(records: tuple[StepRecord, ...]) -> list[Transition]:
+@runtime_checkable
+class Acted(Protocol):
+    """What is asked of a tick to make transitions; a `StepRecord`, or what its log has of it."""
+
+    @property
+    def executed(self) -> Float[np.ndarray, " A"] | None:
+        """The action carried out, if one was."""
+        ...
+
+    @property
+    def observation(self) -> Float[np.ndarray, " O"] | None:
+        """What the policy read, if all was seen."""
+        ...
+
+    @property
+    def choice(self) -> Choice | None:
+        """What was proposed and chosen, if anything was."""
+        ...
+
+    @property
+    def success(self) -> bool:
+        """Whether the task was done."""
+        ...
+
+
+def transitions(records: Sequence[Acted]) -> list[Transition]:
     """Every action that was carried out and whose outcome, at the next tick, was observed."""
     found = []
     for record, after in pairwise(records):

@@ -44,8 +44,10 @@ class Session:
     """Runs episodes with one crew."""
 
     def __init__(self, crew: Crew, calls: Worker, horizon: int, patience: Patience | None = None) -> None:
-        """`horizon` is the most actions of an episode; `calls` makes the robot's blocking calls."""
-        self._crew, self._calls, self._horizon = crew, calls, horizon
+        """`calls` makes the robot's blocking calls."""
+        self._crew, self._calls = crew, calls
+        self.horizon = horizon
+        """The most actions of an episode; it may change from one to the next."""
         self._mender = Mender(crew, calls, patience or Patience())
         self._told = False
 
@@ -61,12 +63,22 @@ class Session:
         crew = Crew.of(rig, task, chooser, worker_for(clock, "policy"), steps)
         return cls(crew, worker_for(clock, "robot calls"), horizon)
 
+    @property
+    def stopped(self) -> str:
+        """Why it ends at the next chance; "" if nothing asks for it."""
+        return self._mender.stopped()
+
     def run(
-        self, starts: Iterable[int], purpose: Purpose = "evaluate", learner: Learner | None = None
+        self,
+        starts: Iterable[int],
+        purpose: Purpose = "evaluate",
+        learner: Learner | None = None,
+        first: int = 0,
     ) -> SessionResult:
         """One episode per start state, until they are done or something ends the session.
 
-        The stage is not closed: it belongs to whoever made the rig.
+        The stage is not closed: it belongs to whoever made the rig. `first` is the number of the first
+        episode: a run that is taken up again goes on counting.
 
         Raises:
             LogError: steps could not be written at all.
@@ -76,7 +88,7 @@ class Session:
         try:
             with self._crew.button:
                 ended = self._mender.connect()
-                for number, start in enumerate(starts):
+                for number, start in enumerate(starts, first):
                     ended = ended or self._unlearned(purpose, learner) or self._prepared(start)
                     if ended:
                         break
@@ -100,7 +112,7 @@ class Session:
         return self._mender.stopped()
 
     def _episode(self, number: int, start: int) -> EpisodeResult:
-        result = Episode(self._crew, number, start, self._horizon).run()
+        result = Episode(self._crew, number, start, self.horizon).run()
         self._crew.log.put(result.row(number))
         return result
 
