@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from hcpg import registry
+from hcpg.commands import robot_replay, robot_trials
 from hcpg.commands.arms import announced, arm_action, with_priority
 from hcpg.loops.control import drill_table
 from hcpg.loops.control.choosing import Chooser
@@ -138,4 +139,6 @@ def _parser() -> argparse.ArgumentParser:
     faults.add_argument("--fault", nargs="*", help=f"some of: {', '.join(FAULTS)}; default: all")
     faults.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new folder")
     faults.add_argument("--into", type=Path, metavar="FILE", help="a document with a place for the table")
+    robot_trials.add(actions)
+    robot_replay.add(actions)
     return parser
