@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from hcpg import registry
-from hcpg.commands import robot_replay, robot_trials
+from hcpg.commands import robot_learning, robot_replay, robot_trials
 from hcpg.commands.arms import announced, arm_action, with_priority
 from hcpg.loops.control import drill_table
 from hcpg.loops.control.choosing import Chooser
@@ -122,7 +122,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="hcpg robot",
         description="An arm at 30 Hz, or its twin. Limits are on unless the robot's file says so.",
     )
-    actions = parser.add_subparsers(required=True, metavar="check | run | drill")
+    actions = parser.add_subparsers(required=True, metavar="ACTION")
     check = arm_action(actions, "check", _check, "connect, check, hold still, let go")
     check.add_argument("--seconds", type=float, default=2.0, help="how long to hold; default: 2")
     check.add_argument("--out", type=Path, metavar="FILE", help="what was found, as JSON")
@@ -139,6 +139,7 @@ def _parser() -> argparse.ArgumentParser:
     faults.add_argument("--fault", nargs="*", help=f"some of: {', '.join(FAULTS)}; default: all")
     faults.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new folder")
     faults.add_argument("--into", type=Path, metavar="FILE", help="a document with a place for the table")
+    robot_learning.add(actions)
     robot_trials.add(actions)
     robot_replay.add(actions)
     return parser

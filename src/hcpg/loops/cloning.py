@@ -132,7 +132,7 @@ def _checked(method: Method, state: Any, shown: Batch, seed: int) -> dict[str, f
     """How far the clone, acting, is from what was shown, and from itself; in units of the action."""
     places = np.linspace(0, len(shown.rewards) - 1, CHECKED).round().astype(int)
     observations = jnp.asarray(shown.observations[places])
-    keys = jax.random.split(jax.random.fold_in(key(seed, Stream.CLONING), -1), CHECKED)
+    keys = jax.random.split(jax.random.fold_in(key(seed, Stream.CLONING), np.iinfo(np.int32).max), CHECKED)
 
     @jax.jit
     def ask(state: Any) -> Float[Array, "N K A"]:

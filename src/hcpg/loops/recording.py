@@ -82,7 +82,7 @@ class Paced:
     ) -> Float[np.ndarray, "K A"]:
         """The proposals of a period after the last ones."""
         self._clock.sleep_until(self._due_s)
-        self._due_s = max(self._due_s, self._clock.now_s() - self._period_s) + self._period_s
+        self._due_s = max(self._due_s, self._clock.now_s()) + self._period_s
         return self._propose(observation, count, draw)
 
 

@@ -73,9 +73,16 @@ class Keyboard:
 
     def _read(self) -> None:
         while select.select([self._descriptor], [], [], 0.0)[0]:
-            typed = os.read(self._descriptor, _CHUNK)
-            if not typed:
-                raise DeviceError("the terminal is at its end (EOF): nobody can move the arm any more")
-            for key in typed.decode(errors="ignore").lower():
+            for key in self._typed():
                 self._pressed_s[key] = self._clock.now_s()
                 self._grip = GRIPS.get(key, self._grip)
+
+    def _typed(self) -> str:
+        gone = "the terminal is at its end (EOF): nobody can move the arm any more"
+        try:
+            typed = os.read(self._descriptor, _CHUNK)
+        except OSError as error:
+            raise DeviceError(gone) from error
+        if not typed:
+            raise DeviceError(gone)
+        return typed.decode(errors="ignore").lower()
