@@ -18,6 +18,7 @@ COMMANDS = {
     "experiment": "make the runs of a table on all cores, or show how far they are",
     "play": "make a video of a trained run",
     "track": "mirror runs into TensorBoard or W&B, while they train or later",
+    "export": "write a trained run's policy for a computer without JAX",
     "report": "write the table and the learning curves of all runs in a folder",
     "robot": "look at an arm or its twin, run episodes on it at 30 Hz, inject faults",
     "list": "show the methods, selectors, tasks, presets and budgets",
