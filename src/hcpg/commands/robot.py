@@ -9,18 +9,15 @@ from functools import partial
 from pathlib import Path
 
 from hcpg import registry
-from hcpg.commands import robot_learning, robot_replay, robot_trials
-from hcpg.commands.arms import announced, arm_action, with_priority
-from hcpg.loops.control import drill_table
+from hcpg.commands import robot_drill, robot_learning, robot_replay, robot_trials
+from hcpg.commands.arms import announced, arm_action
 from hcpg.loops.control.choosing import Chooser
-from hcpg.loops.control.drill import Outcome, drill
-from hcpg.loops.control.drill_list import FAULTS
 from hcpg.loops.control.proposing import uniform
 from hcpg.loops.control.records import EpisodeResult
 from hcpg.loops.control.sessions import Session
 from hcpg.loops.control.step_log import plain
 from hcpg.loops.control.watching import Watched, watch
-from hcpg.registry import UnknownNameError
+from hcpg.robot_types import RobotError
 from hcpg.selection import RULES, Selector
 
 STEPS = "steps.jsonl"
@@ -45,11 +42,9 @@ def _check(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """0 where every episode was run, 128 + the signal where one stopped it, else 1."""
+    chooser = _chooser(options)
     rig, task = announced(options), registry.robot_task(options.task)
     address = registry.task(options.task)
-    selector = Selector(rule=options.selector, candidates=options.candidates)
-    propose = partial(uniform, options.seed, task.action_size)
-    chooser = Chooser(propose, selector, address.adapters[options.adapter], task.action_size, options.seed)
     options.out.mkdir(parents=True, exist_ok=True)
     session = Session.of(rig, task, chooser, options.out / STEPS, options.horizon or address.horizon)
     with closing(rig.stage):
@@ -61,37 +56,24 @@ def _run(options: argparse.Namespace) -> int:
     return int(bool(done.ended)) if done.signal is None else 128 + done.signal
 
 
-def _drill(options: argparse.Namespace) -> int:
-    """0 where every fault was harmless."""
-    names = options.fault or list(FAULTS)
-    for name in names:
-        if name not in FAULTS:
-            raise UnknownNameError("fault", name, list(FAULTS))
-    outcomes: dict[str, Outcome] = {}
-    for name in names:
-        outcome = _drilled(options, name)
-        if outcome.signal is not None:
-            return 128 + outcome.signal
-        outcomes[name] = outcome
-        sys.stdout.write(f"{drill_table.line(name, outcome)}\n")
-    (options.out / "outcomes.json").write_text(json.dumps(plain(outcomes), indent=2) + "\n")
-    place = drill_table.place(options.robot, options.address)
-    table = drill_table.table(place, options.task, outcomes)
-    (options.out / "table.md").write_text(table)
-    if options.into is not None:
-        options.into.write_text(drill_table.inserted(options.into.read_text(), place, table))
-    return int(not all(map(drill_table.harmless, outcomes.values())))
+def _chooser(options: argparse.Namespace) -> Chooser:
+    """Random proposals with the selector that the options name, or an exported policy with its own.
 
+    Raises:
+        RobotError: the policy is one for another task.
+    """
+    adapters, size = registry.task(options.task).adapters, registry.robot_task(options.task).action_size
+    if options.policy is None:
+        selector = Selector(rule=options.selector, candidates=options.candidates)
+        propose = partial(uniform, options.seed, size)
+        return Chooser(propose, selector, adapters[options.adapter], size, options.seed)
+    from hcpg.loops.control.deployed import Policy
 
-def _drilled(options: argparse.Namespace, name: str) -> Outcome:
-    folder = options.out / name
-    folder.mkdir(parents=True, exist_ok=False)
-    plugin = registry.robot(options.robot)
-    rig = with_priority(plugin.make(options.task, options.address))
-    read_scene = registry.task(options.task).adapters["paper"]
-    task = registry.robot_task(options.task)
-    with closing(rig.stage):
-        return drill(rig, plugin.kind, task, read_scene, FAULTS[name], folder)
+    policy = Policy.load(options.policy)
+    if policy.task != options.task:
+        raise RobotError(f"the policy in {options.policy} is one for {policy.task}, not for {options.task}")
+    read_scene = adapters[policy.adapter]
+    return Chooser(policy.proposer(options.seed), policy.selector, read_scene, size, options.seed)
 
 
 def _watched_lines(seen: Watched, seconds: float) -> Iterator[str]:
@@ -126,7 +108,8 @@ def _parser() -> argparse.ArgumentParser:
     check = arm_action(actions, "check", _check, "connect, check, hold still, let go")
     check.add_argument("--seconds", type=float, default=2.0, help="how long to hold; default: 2")
     check.add_argument("--out", type=Path, metavar="FILE", help="what was found, as JSON")
-    play = arm_action(actions, "run", _run, "episodes of random proposals with a selector")
+    play = arm_action(actions, "run", _run, "episodes of an exported policy, or of random proposals")
+    play.add_argument("--policy", type=Path, metavar="FOLDER", help="what `hcpg export` wrote")
     play.add_argument("--selector", choices=RULES, default="hcpg")
     play.add_argument("--candidates", type=int, default=4, help="proposals per action (K); default: 4")
     play.add_argument("--adapter", default="paper", help="scene reader; default: paper")
@@ -135,10 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     play.add_argument("--horizon", type=int, help="most actions of an episode; default: the task's")
     play.add_argument("--seed", type=int, default=0, help="of the proposals; default: 0")
     play.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where the steps are written")
-    faults = arm_action(actions, "drill", _drill, "inject faults into a twin and tell what happened")
-    faults.add_argument("--fault", nargs="*", help=f"some of: {', '.join(FAULTS)}; default: all")
-    faults.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new folder")
-    faults.add_argument("--into", type=Path, metavar="FILE", help="a document with a place for the table")
+    robot_drill.add(actions)
     robot_learning.add(actions)
     robot_trials.add(actions)
     robot_replay.add(actions)

@@ -40,7 +40,7 @@ class Seen:
     applied: int = 0
     """Commands that reached the arm."""
     applied_while_wrong: int = 0
-    """Of these, while the controller was in a reflex, disconnected or stopped."""
+    """Of these, while the controller was in a reflex, disconnected or stopped, injected or truly."""
     refused: dict[str, int] = field(default_factory=dict)
     """Commands that were not let through, by reason."""
     position: Float[np.ndarray, " 3"] | None = None
@@ -191,5 +191,5 @@ class FaultyRobot:
         if not final.applied:
             return self._refused(final)
         self.seen.applied += 1
-        self.seen.applied_while_wrong += self.wrong.mode is not None
+        self.seen.applied_while_wrong += (self.wrong.mode or true.mode) not in ("idle", "move")
         return final

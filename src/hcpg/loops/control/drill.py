@@ -1,7 +1,9 @@
 """A fault on purpose, in the middle of an episode, and what the loop made of it."""
 
 import json
+import subprocess
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -59,7 +61,9 @@ class Site:
         self.robot = FaultyRobot(rig.robot)
         self.spoil: Callable[[np.ndarray], np.ndarray] = lambda proposals: proposals
         """What the policy makes of its proposals."""
-        self.blind, self.learner_alive = False, True
+        self.blind = False
+        self.learner = subprocess.Popen(["sleep", "100000"])
+        """A process that stands in for the learner's."""
         self.disk: Disk
         self.button: StopButton
         self._fault, self._eyes = fault, rig.perception
@@ -90,8 +94,13 @@ class Site:
         self._eyes.forget()
 
     def alive(self) -> bool:
-        """Whether the learner is; the site is the loop's `Learner`, too."""
-        return self.learner_alive
+        """Whether the learner's process is; the site is the loop's `Learner`, too."""
+        return self.learner.poll() is None
+
+    def close(self) -> None:
+        """End the process that stands in for the learner's."""
+        self.learner.kill()
+        self.learner.wait()
 
     def offer(self, result: EpisodeResult) -> None:
         """Nothing is learned here."""
@@ -179,7 +188,8 @@ def drill(
     crew = Crew.of(parts, task, chooser, worker_for(clock, "policy"), log)
     site.button = crew.button
     session = Session(crew, worker_for(clock, "robot calls"), fault.horizon)
-    done = session.run(range(EPISODES), fault.purpose, site)
+    with closing(site):
+        done = session.run(range(EPISODES), fault.purpose, site)
     if not done.episodes or len(done.episodes[0].records) <= FIRST_TICK:
         before = done.episodes[0].verdict.cause if done.episodes else done.ended
         raise DrillError(f"{fault.what}: it never came to that, because of something real: {before}")

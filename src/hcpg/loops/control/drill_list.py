@@ -56,8 +56,9 @@ def _see(site: Site) -> None:
     site.blind = False
 
 
-def _bury_learner(site: Site) -> None:
-    site.learner_alive = False
+def _kill_learner(site: Site) -> None:
+    site.learner.kill()
+    site.learner.wait()
 
 
 def _fill_disk(site: Site) -> None:
@@ -135,8 +136,8 @@ FAULTS: Mapping[str, Fault] = {
     "frozen_perception": Fault("the camera's last picture stays", _blind),
     "camera_gap": Fault("no picture for 600 ms", _blind, 18, _see),
     "gripper_refusal": Fault("the gripper refuses every command", _refuse_grip),
-    "learner_death_training": Fault("the learner dies in training", _bury_learner, purpose="train"),
-    "learner_death_evaluating": Fault("the learner dies in an evaluation", _bury_learner),
+    "learner_death_training": Fault("the learner is killed in training", _kill_learner, purpose="train"),
+    "learner_death_evaluating": Fault("the learner is killed in an evaluation", _kill_learner),
     "full_disk": Fault("the disk is full", _fill_disk),
     "stop_twice": Fault("stop is pressed twice", _press_twice),
 }

@@ -36,9 +36,10 @@ def line(name: str, outcome: Outcome) -> str:
     return f"{mark:4}  {name:26}  {', '.join(outcome.endings)} ({outcome.cause}){ended}"
 
 
-def place(robot: str, address: str | None) -> str:
+def place(robot: str, address: str | None, serve: bool = False) -> str:
     """The options that name a robot, whichever address it has: the name of its place in a document."""
-    return f"--robot {robot}" if address is None else f"--robot {robot} --address ADDRESS"
+    where = "" if address is None else " --address ADDRESS"
+    return f"--robot {robot}{where}{' --serve' * serve}"
 
 
 def table(place: str, task: str, outcomes: Mapping[str, Outcome]) -> str:
