@@ -149,6 +149,7 @@ def test_list_names_what_there_is(capsys):
     assert described["hcpg_opposed"] == "sac_flow with selector hcpg (K = 4, opposed directions)"
     assert described["hcpg_training_only"] == "sac_flow with selector hcpg (K = 4), evaluated alone"
     assert described["qsm"] == "qsm alone"
+    assert described["sac_flow_rlinf"] == "sac_flow alone, velocity decoder, critic polyak"
     assert any(line.startswith("  point/carry ") for line in lines)
 
 

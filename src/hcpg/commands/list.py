@@ -44,10 +44,11 @@ def _lines(kind: str) -> dict[str, str]:
 
 
 def _pair(preset: presets.Preset) -> str:
-    """The method, and what selects while it trains and while it is evaluated."""
+    """The method, what selects while it trains and while it is evaluated, and which parts are exchanged."""
     at_evaluation = preset.evaluation_selector
     evaluated = "" if at_evaluation is None else f", evaluated {_selection(at_evaluation)}"
-    return f"{preset.method} {_selection(preset.selector)}{evaluated}"
+    parts = "".join(f", {name} {value}" for name, value in preset.learner.items() if isinstance(value, str))
+    return f"{preset.method} {_selection(preset.selector)}{evaluated}{parts}"
 
 
 def _selection(selector: Selector) -> str:
