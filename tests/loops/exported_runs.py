@@ -49,7 +49,7 @@ def a_run(root, method="sac_flow", selector=None, successes=(1, 3), **learner):
     moments = {"actor_moments": shaken(state.actor_moments)} if hasattr(state, "actor_moments") else {}
     state = state._replace(actor=shaken(state.actor), **moments)
     observations = np.random.default_rng(4).normal(0.0, 0.3, (2, SPEC.observation_size)).astype(np.float32)
-    trees = {"observations": {"next": observations}}
+    trees = {"state": state, "observations": {"next": observations}}
     checkpoints.save(folder.checkpoints, STEP, trees, {})
     append_rows(folder.path / "episodes.jsonl", _rows(selector, successes))
     name = "bare" if selector.alone else selector.rule
