@@ -96,6 +96,8 @@ def _clone(options: argparse.Namespace) -> int:
 
 def _learn(options: argparse.Namespace) -> int:
     """0 where the budget is spent, 128 + the signal where one stopped it, else 1."""
+    if options.resume is None and None in (options.initial, options.demos):
+        raise LearnOptionsError("give --initial and --demos for a new run, or --resume RUN to continue one")
     programs = choice.prepare()
     from hcpg.loops import online
 
@@ -119,8 +121,6 @@ def _begun(options: argparse.Namespace) -> "RunFolder":
     from hcpg.loops import online
     from hcpg.loops.trained import Choice, load
 
-    if options.initial is None or options.demos is None:
-        raise LearnOptionsError("give --initial and --demos for a new run, or --resume RUN to continue one")
     shown = demonstrations.load(options.demos, options.task)
     settings = arm_budgets.settings(options.task, options.preset, options.steps, options.updates_per_step)
     sources = online.Sources(load(options.initial, Choice()), options.demos, shown.digest)

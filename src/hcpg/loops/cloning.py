@@ -41,6 +41,7 @@ class Recipe:
     """How a clone is made; the same for every method that starts from it."""
 
     steps: int = 5000
+    """Of flow matching."""
     batch_size: int = 256
     learning_rate: float = 1e-3
     """At the start; it falls to nothing along a cosine."""
@@ -86,31 +87,35 @@ def matched(
     actor: FlowActor, flow_steps: int, shown: Batch, recipe: Recipe, seed: int
 ) -> tuple[FlowActor, Any, dict[str, float]]:
     """The actor after cloning, its running moments, and the losses of the last steps."""
-    observations, ends = jnp.asarray(shown.observations), end_points(jnp.asarray(shown.actions))
+    ends = np.asarray(end_points(jnp.asarray(shown.actions)))
     adam = optax.adam(optax.cosine_decay_schedule(recipe.learning_rate, recipe.steps))
     root = key(seed, Stream.CLONING)
 
-    def step(progress: Progress, number: Array) -> tuple[Progress, dict[str, Array]]:
-        of_rows, of_noise = jax.random.split(jax.random.fold_in(root, number))
-        rows = jax.random.randint(of_rows, (recipe.batch_size,), 0, len(observations))
-        noise = Noise.draw(of_noise, (recipe.batch_size, ends.shape[1]), flow_steps)
-        path = bridge(ends[rows], noise, recipe.deviation)
+    def step(progress: Progress, batch: tuple[Array, Array, Array]) -> tuple[Progress, dict[str, Array]]:
+        number, observations, targets = batch
+        noise = Noise.draw(jax.random.fold_in(root, number), targets.shape, flow_steps)
+        path = bridge(targets, noise, recipe.deviation)
         slope = jax.grad(matching_loss, has_aux=True)
         gradient, (moments, metrics) = slope(
-            progress.actor, progress.moments, observations[rows], path, recipe.deviation
+            progress.actor, progress.moments, observations, path, recipe.deviation
         )
         change, optimizer = adam.update(gradient, progress.optimizer)
         return Progress(optax.apply_updates(progress.actor, change), moments, optimizer), metrics
 
     @partial(jax.jit, donate_argnums=0)
-    def advance(progress: Progress, first: Array) -> tuple[Progress, dict[str, Array]]:
-        progress, history = jax.lax.scan(step, progress, first + jnp.arange(CHUNK))
+    def advance(progress: Progress, batches: tuple[Array, Array, Array]) -> tuple[Progress, dict[str, Array]]:
+        progress, history = jax.lax.scan(step, progress, batches)
         return progress, jax.tree.map(jnp.mean, history)
 
     fresh = jax.tree.map(jnp.copy, actor)  # the compiled steps consume what they are given
     progress, metrics = Progress(fresh, fresh.moments(), adam.init(fresh)), {}
     for first in range(0, recipe.steps, CHUNK):
-        progress, metrics = advance(progress, jnp.asarray(first))
+        # Drawn out here, so that one compiled program serves any number of demonstrations.
+        random = np.random.default_rng([seed, Stream.CLONING, first])
+        rows = random.integers(len(ends), size=(CHUNK, recipe.batch_size))
+        progress, metrics = advance(
+            progress, (first + np.arange(CHUNK), shown.observations[rows], ends[rows])
+        )
     return progress.actor, progress.moments, {name: float(value) for name, value in metrics.items()}
 
 
@@ -131,14 +136,13 @@ def warmed_up(method: Method, state: Any, shown: Batch, recipe: Recipe, seed: in
 def _checked(method: Method, state: Any, shown: Batch, seed: int) -> dict[str, float]:
     """How far the clone, acting, is from what was shown, and from itself; in units of the action."""
     places = np.linspace(0, len(shown.rewards) - 1, CHECKED).round().astype(int)
-    observations = jnp.asarray(shown.observations[places])
     keys = jax.random.split(jax.random.fold_in(key(seed, Stream.CLONING), np.iinfo(np.int32).max), CHECKED)
 
     @jax.jit
-    def ask(state: Any) -> Float[Array, "N K A"]:
+    def ask(state: Any, observations: Array) -> Float[Array, "N K A"]:
         return jax.vmap(lambda each, own: method.propose(state, each, own, CANDIDATES))(observations, keys)
 
-    proposals = np.asarray(ask(state))
+    proposals = np.asarray(ask(state, shown.observations[places]))
     error = proposals.mean(axis=1) - shown.actions[places]
     return {
         "mean_proposal_error": float(np.sqrt(np.square(error).sum(axis=-1).mean())),

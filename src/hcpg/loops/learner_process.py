@@ -53,9 +53,9 @@ class LearnerProcess:
 
     def give(self, episode: Experience) -> None:
         """Hand an episode over; a learner that has died takes nothing."""
+        self._owes += 1
         with suppress(BrokenPipeError, ConnectionResetError):  # `word` will notice
             self._pipe.send(episode)
-            self._owes += 1
 
     def word(self, stop: Callable[[], bool]) -> Word | None:
         """What it tells next, waited for until `stop` says so; None then, or if nothing is owed.

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Array
 
 from hcpg import presets, registry
 from hcpg.interfaces import Rig
@@ -103,7 +104,7 @@ class Policy:
         self._template = jax.jit(method.init)(key(seed, Stream.NETWORKS))
         self._root, self._state = key(seed, Stream.ACTOR), self._template
 
-        def propose(state: Any, observation: jax.Array, count: int, draw: int) -> jax.Array:
+        def propose(state: Any, observation: Array, count: int, draw: Array) -> Array:
             return method.propose(state, observation, jax.random.fold_in(self._root, draw), count)
 
         self._propose = jax.jit(propose, static_argnums=2)
