@@ -24,6 +24,7 @@ def test_a_row_per_variant_with_the_sd_over_seeds(groups):
     figure = ablation_figure(ablated(groups))
     assert figure.get_size_inches()[0] == COLUMN_IN
     assert [panel.get_title() for panel in figure.axes] == ["Last-5, %", "AUC, %", "Final, %"]
+    assert {panel.get_xlim() for panel in figure.axes} == {figure.axes[0].get_xlim()}
     panel = figure.axes[0]
     assert [text.get_text() for text in panel.get_yticklabels()] == ["SAC-Flow", "HCPG K=2", "HCPG K=4"]
     bars = panel.containers[1]
@@ -40,5 +41,6 @@ def test_success_over_k_by_task_and_its_mean(groups):
     assert list(lines["mean over tasks"].get_xdata()) == [0, 1, 2]
     assert list(lines["mean over tasks"].get_ydata()) == pytest.approx([30, 50, 80])
     assert [text.get_text() for text in axes.get_xticklabels()] == ["1", "2", "4"]
+    assert list(axes.get_yticks()) == [0, 25, 50, 75, 100]
     pick = next(each for each in axes.containers if each.get_label() == "PickCube")
     assert list(pick.lines[0].get_ydata()) == pytest.approx([40, 60, 90])

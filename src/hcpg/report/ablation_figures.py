@@ -37,7 +37,7 @@ def ablation_figure(groups: Sequence[Group]) -> "Figure":
     variants = [variant for variant in ablation(groups).variants if variant.seeds]
     with drawing():
         figure = blank(COLUMN_IN, 0.55 + 0.19 * len(variants))
-        panels = figure.subplots(1, len(METRICS), sharey=True)
+        panels = figure.subplots(1, len(METRICS), sharex=True, sharey=True)
         for panel, metric in zip(panels, METRICS, strict=True):
             _metric(panel, {variant.preset: variant.seeds[metric] for variant in variants})
             panel.set_title(f"{metric}, %")
@@ -65,6 +65,9 @@ def _metric(panel: "Axes", seeds: Mapping[str, Float[np.ndarray, " S"]]) -> None
     panel.set_ylim(len(seeds) - 0.5, -0.5)
     panel.set_xlim(min(panel.get_xlim()[0], 0), max(panel.get_xlim()[1], 100))
     panel.set_xticks([0, 50, 100])
+    ends = panel.get_xticklabels()
+    ends[0].set_horizontalalignment("left")  # or 100 would touch the next panel's 0
+    ends[-1].set_horizontalalignment("right")
     panel.tick_params(axis="y", length=0)
     panel.grid(axis="x", color="0.88", linewidth=0.5)
 
@@ -92,6 +95,7 @@ def candidates_figure(groups: Sequence[Group]) -> "Figure":
         axes.set_xlabel("candidates K")
         axes.set_ylabel("last-five success, %")
         axes.set_ylim(top=max(axes.get_ylim()[1], 102))
+        axes.set_yticks(range(0, 101, 25))  # whiskers may reach beyond, success may not
         axes.grid(axis="y", color="0.88", linewidth=0.5)
         figure.legend(loc="outside upper center", ncols=3, frameon=False)
     return figure
