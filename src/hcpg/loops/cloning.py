@@ -42,7 +42,7 @@ class Recipe:
 
     steps: int = 5000
     """Of flow matching."""
-    batch_size: int = 256
+    batch_size: int = 128
     learning_rate: float = 1e-3
     """At the start; it falls to nothing along a cosine."""
     deviation: float = 0.1
