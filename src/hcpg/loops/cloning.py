@@ -26,7 +26,7 @@ from hcpg.report.durable import replace_json
 from hcpg.types import Batch
 
 CHUNK = 100
-"""Steps per compiled call."""
+"""Steps per compiled call; what is asked for is rounded up to a multiple of it."""
 CHECKED, CANDIDATES = 256, 16
 """Demonstrated observations that the clone is asked at in the end, and proposals at each."""
 FACTS = "cloning.json"
