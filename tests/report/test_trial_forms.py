@@ -6,7 +6,9 @@ import io
 import pytest
 from trial_studies import attempt, paper_studies, write_study
 
-from hcpg.report.trial_files import write_tables
+from hcpg import cli
+from hcpg.report.trial_figure import trial_figure
+from hcpg.report.trial_files import write_figure, write_tables
 from hcpg.report.trial_forms import as_csv, caption, contrasts_csv, latex, markdown
 from hcpg.report.trial_records import find_studies
 from hcpg.report.trial_table import trial_table
@@ -83,7 +85,29 @@ def test_missing_trials_are_said(tmp_path):
 
 def test_files_carry_the_command(tmp_path):
     root = paper_studies(tmp_path / "trials")
-    text, files = write_tables(root, tmp_path / "out", "hcpg robot trials --report trials")
+    text, files = write_tables(find_studies(root), tmp_path / "out", "hcpg robot trials --report trials")
     assert [file.name for file in files] == ["trials.md", "trials.tex", "trials.csv", "trial_differences.csv"]
     assert files[0].read_text() == text
     assert text.endswith("made by: hcpg robot trials --report trials\n")
+
+
+def test_the_figure_s_marks_are_the_table_s_numbers_and_it_says_twin(table, studies, tmp_path):
+    figure = trial_figure(table)
+    rates, steps = figure.axes
+    [sac, ours] = [line.get_ydata() for line in rates.get_lines() if len(line.get_ydata()) == 2][::3]
+    assert sorted([*sac, *ours]) == pytest.approx([200 / 3, 280 / 3, 100, 100])
+    assert figure.get_suptitle() == "Trials: twin, served over the arm's own protocol"
+    assert [label.get_text() for label in steps.get_xticklabels()] == ["PegInsertion", "RugbyGrasp"]
+    files = write_figure(studies, tmp_path, "a command")
+    assert {file.name for file in files} == {"trials.png", "trials.svg", "trials.pdf", "trials.caption.txt"}
+    assert "Trials (twin" in (tmp_path / "trials.caption.txt").read_text()
+
+
+def test_hcpg_report_writes_the_trials_beside_its_tables(write_run, capsys):
+    root = write_run(preset="sac", bare=[1, 2, 3, 4, 5]).parents[4]
+    paper_studies(root / "trials")
+    assert cli.main(["report", str(root), "--no-figures"]) == 0
+    told = capsys.readouterr().out
+    for name in ("trials.md", "trials.tex", "trials.csv", "trial_differences.csv"):
+        assert str(root / "report" / name) in told
+    assert (root / "report/trials.md").read_text().startswith("Trials (twin")

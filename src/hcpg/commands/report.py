@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 DESCRIPTION = """Write one page (report.html, which needs no network), the paper's tables (Markdown, LaTeX,
 CSV) and figures (png, svg, pdf, each with a caption) of all runs under DIR, and print the main table:
 last-five success, curves, bars, learning progress, and the ablation and candidate counts where such runs are
-there. All runs must have one protocol."""
+there; and the table of `hcpg robot trials`. All runs must have one protocol."""
 PAGE = "report.html"
 
 
@@ -28,6 +28,8 @@ def run(arguments: Sequence[str]) -> int:
     from hcpg.report.paper_figures import write_figures
     from hcpg.report.provenance import provenance, signed
     from hcpg.report.records import load_runs
+    from hcpg.report.trial_files import write_figure, write_tables
+    from hcpg.report.trial_records import find_studies
 
     with noticed() as notices:
         groups = _chosen(load_runs(options.runs, options.skip_corrupt), options)
@@ -37,6 +39,9 @@ def run(arguments: Sequence[str]) -> int:
         for name, text in texts.items():
             (out / name).write_text(signed(name, text, origin))
         pictures = [] if options.no_figures else write_figures(groups, out, command)
+        if studies := find_studies(*options.runs):
+            pictures += write_tables(studies, out, command)[1]
+            pictures += [] if options.no_figures else write_figure(studies, out, command)
     request = Request(
         roots=options.runs,
         out=out / PAGE,

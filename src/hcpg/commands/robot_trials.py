@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from hcpg import registry
 from hcpg.commands import choice
@@ -14,13 +15,16 @@ from hcpg.commands.arms import announced
 from hcpg.commands.scripted import expert, referee_of
 from hcpg.interfaces import Rig
 from hcpg.loops.control.choosing import Chooser
-from hcpg.loops.trials.contenders import Contender, chance
+from hcpg.loops.control.deployed.parcel import POLICY
+from hcpg.loops.trials.contenders import ALONE, BARE, Contender, chance, exported
 from hcpg.loops.trials.ledger import Ledger
 from hcpg.loops.trials.operator import Console, Nobody, NobodyThereError
 from hcpg.loops.trials.plan import Plan, PlanError
 from hcpg.loops.trials.running import Arena, run_trials
 from hcpg.registry import UnknownNameError
+from hcpg.robots.twin import START_SEED
 from hcpg.selection import RULES, Selector
+from hcpg.twin.launching import served
 
 DESCRIPTION = """Try policies on one task of an arm or its twin: every policy from the same start states, in
 an order that is drawn, shown to the operator by codes alone. Give the same command again to go on after a
@@ -36,6 +40,7 @@ def add(actions: "argparse._SubParsersAction") -> None:
     add_option("task", metavar="TASK", nargs="?", help="as `hcpg list tasks` has it")
     add_option("--robot", help=f"one of: {', '.join(registry.names('robots'))}")
     add_option("--address", help="the controller's, where the robot has one")
+    add_option("--serve", action="store_true", help="serve the twin at ADDRESS while the trials run")
     add_option("--policy", action="append", default=[], metavar="NAME=WHAT", help=_POLICY)
     add_option("--selector", action="append", default=[], metavar="NAME=RULE", help=_SELECTOR)
     add_option("--adapter", help="scene reader; default: the run's own, or paper")
@@ -48,8 +53,8 @@ def add(actions: "argparse._SubParsersAction") -> None:
 
 
 _POLICY = (
-    f"a run folder or checkpoint, `{EXPERT}` (a twin's scripted expert) or `{CHANCE}`; once for each policy, "
-    "in the order in which the table shall compare them"
+    f"a run folder, a checkpoint, what `hcpg export` wrote, `{EXPERT}` (a twin's scripted expert) or "
+    f"`{CHANCE}`; once for each policy, in the order in which the table shall compare them"
 )
 _SELECTOR = f"how the policy NAME selects: one of {', '.join(RULES)}, or bare; default: the run's own"
 
@@ -65,9 +70,10 @@ def carry_out(options: argparse.Namespace) -> int:
     kind = registry.robot(options.robot).kind
     if options.unattended and kind != "twin":
         raise PlanError("only a twin runs unattended; somebody has to stand beside an arm")
-    rig = announced(options)
-    with closing(rig.stage), _prepared(options):
-        return _run(options, rig)
+    with _served(options), _prepared(options):
+        rig = announced(options)
+        with closing(rig.stage):
+            return _run(options, rig)
 
 
 def _run(options: argparse.Namespace, rig: Rig) -> int:
@@ -88,10 +94,26 @@ def _run(options: argparse.Namespace, rig: Rig) -> int:
 
 
 @contextmanager
+def _served(options: argparse.Namespace) -> Iterator[None]:
+    """The twin, if it is to be served from here; its log lies beside the trials."""
+    if not options.serve:
+        yield
+        return
+    suite, _, name = options.task.partition("/")
+    if suite != "franka" or options.robot != "twin" or options.address is None:
+        raise PlanError("--serve serves a twin: give a task of franka, --robot twin and --address 127.0.0.1")
+    folder = options.out / options.task
+    folder.mkdir(parents=True, exist_ok=True)
+    with served(name, options.address, START_SEED, folder / "server.log"):
+        yield
+
+
+@contextmanager
 def _prepared(options: argparse.Namespace) -> Iterator[None]:
     """JAX set up as training was, where a policy was trained; without one it is never imported."""
     chosen = _pairs("--policy", options.policy).values()
-    programs = choice.prepare() if set(chosen) - {EXPERT, CHANCE} else None
+    needs_jax = any(what not in (EXPERT, CHANCE) and not _is_exported(Path(what)) for what in chosen)
+    programs = choice.prepare() if needs_jax else None
     yield
     if programs is not None:
         programs.close()
@@ -143,6 +165,8 @@ def _contender(options: argparse.Namespace, rig: Rig, what: str, rule: str | Non
         return Contender(
             facts, lambda start: Chooser(propose, selector, read_scene, size, options.seed + start)
         )
+    if _is_exported(Path(what)):
+        return exported(Path(what), _known(rule), registry.task(task), task, options.seed)
     from hcpg.loops.trained import Choice
     from hcpg.loops.trials.trained_policies import trained
 
@@ -151,11 +175,18 @@ def _contender(options: argparse.Namespace, rig: Rig, what: str, rule: str | Non
 
 def _selector(rule: str | None) -> Selector:
     """For proposals that nothing learned; without a rule there is nothing to choose."""
-    if rule in (None, "bare"):
-        return Selector("first", candidates=1)
-    if rule not in RULES:
-        raise UnknownNameError("selector", str(rule), [*RULES, "bare"])
-    return Selector(rule)
+    known = _known(rule)
+    return ALONE if known in (None, BARE) else Selector(known)
+
+
+def _known(rule: str | None) -> Any:
+    if rule not in (None, BARE, *RULES):
+        raise UnknownNameError("selector", str(rule), [*RULES, BARE])
+    return rule
+
+
+def _is_exported(path: Path) -> bool:
+    return (path / POLICY).exists()
 
 
 def _pairs(option: str, words: Sequence[str]) -> dict[str, str]:
@@ -175,9 +206,12 @@ def _tell(line: str) -> None:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from hcpg.report.trial_files import write_tables
+    from hcpg.report.trial_files import write_figure, write_tables
+    from hcpg.report.trial_records import find_studies
 
     command = shlex.join(["hcpg", "robot", "trials", "--report", str(options.report)])
-    text, files = write_tables(options.report, options.out or options.report, command)
+    studies, out = find_studies(options.report), options.out or options.report
+    text, files = write_tables(studies, out, command)
+    files += write_figure(studies, out, command)
     sys.stdout.write("".join([text, "\n", *(f"{file}\n" for file in files)]))
     return 0

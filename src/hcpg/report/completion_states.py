@@ -4,7 +4,7 @@ Each is drawn from the trial's log: the arm by its joint angles, the things by w
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,18 +13,20 @@ from hcpg.report.records import RecordError
 from hcpg.report.styles import PAGE_IN, blank
 from hcpg.report.trial_replay import LoggedTrial
 from hcpg.twin.drawing import CAMERA, Drawing
-from hcpg.twin.posing import Posing
+from hcpg.twin.posing import Posing, quaternion_of
 from hcpg.twin.scenes import SCENES
-from hcpg.types import UInt8
+from hcpg.types import Float, UInt8
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PIXELS = 720
-VIEW_DEG = 27.0
-"""Narrower than the scene's own camera: the hand and what it works on fill the picture."""
-AIM_M = 0.02
-"""The middle of the picture is so far below the TCP."""
+VIEW_DEG = 24.0
+AIM_M = 0.03
+"""The middle of the picture is so far above the TCP."""
+EYES_M = {"drawer-closing": (-0.55, -0.75, 0.45)}
+"""From the middle of the picture to the camera: from the arm's side, where the drawer would hide the hand."""
+EYE_M = (0.40, -0.85, 0.40)
 STATES = {
     "peg-insertion": "the peg is inserted",
     "button-press": "the button is depressed",
@@ -44,10 +46,7 @@ def last_moment(trial: LoggedTrial) -> UInt8[np.ndarray, "H W 3"]:
     if name not in SCENES or tick.joint_angles.size != 7:
         raise RecordError(f"{trial.title} cannot be drawn; tasks with a scene are {', '.join(SCENES)}")
     posing = Posing(name)
-    camera = posing.model.camera(CAMERA)
-    camera.fovy[0] = VIEW_DEG
-    posing.pose(tick.joint_angles, tick.width_m, tick.sights)
-    camera.pos[:] = _aimed(posing.data.cam_xmat[camera.id], camera.pos, tick.position)
+    _look(posing.model, tick.position + np.array([0.0, 0.0, AIM_M]), np.array(EYES_M.get(name, EYE_M)))
     posing.pose(tick.joint_angles, tick.width_m, tick.sights)
     drawing = Drawing(posing.model, PIXELS)
     try:
@@ -91,10 +90,12 @@ def caption(trials: Sequence[LoggedTrial]) -> str:
     return f"Completion states ({arm}): {'; '.join(parts)}."
 
 
-def _aimed(axes: np.ndarray, position: np.ndarray, tcp: np.ndarray) -> np.ndarray:
-    """The camera moved sideways, in its own picture's plane, until it looks just below the TCP."""
-    frame = axes.reshape(3, 3)
-    wanted = tcp - np.array([0.0, 0.0, AIM_M])
-    across, up = frame[:, 0], frame[:, 1]
-    way = wanted - position
-    return position + (way @ across) * across + (way @ up) * up
+def _look(model: Any, middle: Float[np.ndarray, " 3"], eye: Float[np.ndarray, " 3"]) -> None:
+    """Turn the scene's camera to look at `middle` from `eye` beside it, level."""
+    back = eye / np.linalg.norm(eye)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    frame = np.stack([right, np.cross(back, right), back], axis=1)
+    camera = model.camera(CAMERA)
+    camera.pos[:], camera.fovy[0] = middle + eye, VIEW_DEG
+    camera.quat[:] = quaternion_of(frame)

@@ -123,13 +123,14 @@ def attempts_of(rows: Sequence[Mapping[str, Any]]) -> list[Attempt]:
     return [_attempt(facts) for facts in found.values()]
 
 
-def find_studies(root: Path) -> list[Study]:
-    """Every task's trials at or under `root`, by task.
+def find_studies(*roots: Path) -> list[Study]:
+    """Every task's trials at or under the folders, by task.
 
     Raises:
         RecordError: one of them is damaged, or two are of one task.
     """
-    folders = [Path(folder) for folder, _, files in os.walk(root) if PLAN in files and LEDGER in files]
+    walks = [each for root in roots for each in os.walk(root)]
+    folders = [Path(folder) for folder, _, files in walks if PLAN in files and LEDGER in files]
     studies = [read_study(folder) for folder in folders if _is_plan(folder / PLAN)]
     names = [study.plan["task"] for study in studies]
     for name in names:

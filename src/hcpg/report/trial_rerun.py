@@ -20,7 +20,7 @@ ARM = "world/arm"
 _LEGEND = f"""Arm and things are drawn from what was logged (joint angles, width of the fingers, sightings);
 nothing is simulated again. Arrows from the TCP: the K proposals, the more opaque and thick the larger their
 weight, and what was executed after all limits (blue); one unit of action is drawn {UNIT_M} m long. The box is
-the one that no target leaves. Timelines: `tick` (periods since the episode began, skipped ones too), `time`."""
+the one that no target leaves. Timelines: `tick` (periods since the beginning, skipped ones too), `time`."""
 
 
 def write_trial(trial: LoggedTrial, path: Path) -> None:

@@ -82,7 +82,7 @@ class Posing:
 
     def bodies(self) -> Iterator[tuple[str, Pose]]:
         """Every body that has a shape, and where it is now."""
-        for body in sorted(set(self.model.geom_bodyid)):
+        for body in sorted({int(each) for each in self.model.geom_bodyid}):
             yield self._body_name(body), Pose(self.data.xpos[body].copy(), np.roll(self.data.xquat[body], -1))
 
     def shapes(self) -> Iterator[Shape]:
@@ -108,7 +108,7 @@ class Posing:
             faces = model.mesh_face[mesh.faceadr[0] : mesh.faceadr[0] + mesh.facenum[0]].astype(int)
         rgb = tuple(int(255 * each) for each in color[:3])
         own = model.geom(geom).name or f"{kind}_{geom}"
-        body = self._body_name(model.geom_bodyid[geom])
+        body = self._body_name(int(model.geom_bodyid[geom]))
         return Shape(body, own, kind, pose, model.geom_size[geom].copy(), vertices, faces, rgb)
 
     def _body_name(self, body: int) -> str:
@@ -121,3 +121,11 @@ class Posing:
         top, tip = self.data.site_xpos[self._at.object], self.data.site_xpos[self._at.tip]
         over = float(np.linalg.norm((top - tip)[:2])) < BUTTON_RADIUS_M
         self.data.joint("button").qpos[0] = np.clip(top[2] - tip[2], 0.0, BUTTON_TRAVEL_M) if over else 0.0
+
+
+def quaternion_of(frame: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, " 4"]:
+    """Of a rotation matrix, scalar first, as a model has it."""
+    mujoco: Any = importlib.import_module("mujoco")
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(frame).ravel())
+    return quaternion

@@ -17,12 +17,10 @@ from hcpg.loops.evaluation import BARE
 from hcpg.loops.runs_axis import take
 from hcpg.loops.streams import Stream, key
 from hcpg.loops.trained import Choice, Trained, load
-from hcpg.loops.trials.contenders import Contender
+from hcpg.loops.trials.contenders import ALONE, Contender
 from hcpg.loops.trials.plan import PlanError
 from hcpg.selection import Selector
 from hcpg.types import Float
-
-ALONE = Selector("first", candidates=1)
 
 
 def trained(path: Path, choice: Choice, task: str, seed: int) -> Contender:
