@@ -37,6 +37,13 @@ def test_a_code_is_shown_once_and_says_nothing():
     assert all(len(slot.code) == 4 and not set(slot.code) & set("AEIOUY") for slot in drawn)
 
 
+def test_one_task_s_order_and_codes_tell_nothing_of_another_s():
+    here, there = slots(plan(trials=15)), slots(replace(plan(trials=15), task="point/carry"))
+    assert [slot.start for slot in here if slot.policy == "a"] == [s.start for s in there if s.policy == "a"]
+    assert [slot.policy for slot in here] != [slot.policy for slot in there]
+    assert not {slot.code for slot in here} & {slot.code for slot in there}
+
+
 def test_the_hash_covers_everything():
     first = plan()
     others = [

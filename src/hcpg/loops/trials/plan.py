@@ -1,5 +1,6 @@
 """What is tried, frozen before the first trial: task, arm, limits, policies, start states, their order."""
 
+import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
@@ -78,20 +79,22 @@ def starts(plan: Plan) -> tuple[int, ...]:
 def slots(plan: Plan) -> list[Slot]:
     """All trials in the order of running, ABBA: the policies' order is turned round at every second start.
 
-    Which policy comes first is drawn anew for every such pair, so the order tells nobody who acts.
+    Which policy comes first is drawn anew for every such pair, and for every task: the order of one tells
+    nobody who acts in the next.
     """
-    names, order, turn, random = list(plan.policies), [], [""], np.random.default_rng([plan.seed, 1])
+    names, order, turn = list(plan.policies), [], [""]
+    random = np.random.default_rng([plan.seed, 1, zlib.crc32(plan.task.encode())])
     for place, start in enumerate(starts(plan)):
         drawn = [names[index] for index in random.permutation(len(names))]
         turn = drawn if place % 2 == 0 else turn[::-1]
         order += [(name, start) for name in turn]
-    codes = _codes(plan.seed, len(order))
+    codes = _codes(random, len(order))
     return [Slot(number, codes[number - 1], *each) for number, each in enumerate(order, start=1)]
 
 
-def _codes(seed: int, count: int) -> list[str]:
+def _codes(random: np.random.Generator, count: int) -> list[str]:
     """As many different codes."""
-    random, codes = np.random.default_rng([seed, 2]), dict[str, None]()
+    codes = dict[str, None]()
     while len(codes) < count:
         codes["".join(random.choice(list(LETTERS), CODE_LENGTH))] = None
     return list(codes)
