@@ -1,5 +1,6 @@
 """`hcpg report`: the files it writes, and what it refuses."""
 
+import csv
 import json
 import re
 
@@ -22,6 +23,9 @@ def test_the_table_and_the_figures_are_written(write_run, capsys):
     files = {file.name for file in (root / "report").iterdir()}
     assert files == {"report.html", "table.md", "table.tex", "table.csv", *pictures}
     assert all(str(file) in told for file in (root / "report").iterdir())
+    [row] = csv.DictReader((root / "report/table.csv").read_text().splitlines())
+    assert (row["presets"], row["command"], row["budget"]) == ("sac", f"hcpg report {root}", "cpu")
+    assert row["commit"] in (root / "report/table.tex").read_text()
 
 
 @pytest.fixture

@@ -1,6 +1,8 @@
 """Where a table or picture comes from: the command and code that made it, and the runs that are in it."""
 
-from collections.abc import Iterable, Sequence
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from hcpg.report.checkout import commit_text, own_code
@@ -26,13 +28,25 @@ class Provenance(NamedTuple):
 
 
 def signed(name: str, text: str, origin: Provenance) -> str:
-    """A table with its provenance in a line: below Markdown, as a comment above LaTeX.
+    """A table with its provenance: in a line below Markdown or above LaTeX, in columns of CSV.
 
-    CSV has no place for it; its columns name the protocol.
+    CSV has no comments; so every row has presets, command and commit beside the protocol that it names.
     """
-    if name.endswith(".md"):
-        return f"{text}\n{origin.text()}\n"
-    return f"% {origin.text()}\n{text}" if name.endswith(".tex") else text
+    if name.endswith(".csv"):
+        return _with_columns(
+            text, {"presets": origin.facts["presets"], "command": origin.command, "commit": origin.commit}
+        )
+    return f"{text}\n{origin.text()}\n" if name.endswith(".md") else f"% {origin.text()}\n{text}"
+
+
+def _with_columns(text: str, constants: Mapping[str, str]) -> str:
+    """The CSV with further columns, the same in all rows."""
+    head, *rows = csv.reader(io.StringIO(text))
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow([*head, *constants])
+    writer.writerows([*row, *constants.values()] for row in rows)
+    return file.getvalue()
 
 
 def provenance(groups: Sequence[Group], command: str) -> Provenance:
