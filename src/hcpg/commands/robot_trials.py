@@ -141,7 +141,7 @@ def _arena(options: argparse.Namespace, rig: Rig, plan: Plan, contenders: Mappin
         choosers={name: contender.chooser for name, contender in contenders.items()},
         operator=Nobody() if options.unattended else Console(lays_out=not lays_out),
         lays_out=lays_out,
-        referee=referee_of(rig.stage),
+        referee=referee_of(options.task, rig.stage),
         horizon=plan.horizon,
     )
 
