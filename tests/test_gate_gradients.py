@@ -1,7 +1,9 @@
 """The command that draws what the gate does to gradients: its measure against chains worked out by hand."""
 
+import json
 import math
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import equinox as eqx
@@ -66,3 +68,15 @@ def test_it_writes_a_picture_of_every_field_and_number_of_steps(tmp_path):
     }
     gate_gradients.draw(results, tmp_path / "gains.png")
     assert (tmp_path / "gains.png").stat().st_size > 10_000
+
+
+def test_the_stored_table_and_settings_are_those_of_the_stored_numbers_and_of_today():
+    folder = Path(__file__).parents[1] / "docs/evidence/gate_gradients"
+    stored = json.loads((folder / "numbers.json").read_text())
+    assert gate_gradients.table(stored["results"]) in (folder / "README.md").read_text()
+    for name, settings in stored["settings"].items():
+        velocity, steps = name.split()
+        now = asdict(gate_gradients.method(velocity, int(steps)).config)
+        assert settings == {setting: now[setting] for setting in settings}
+        assert now.keys() - settings.keys() <= {"plain_norm"}  # came later; its default is what was measured
+        assert now["plain_norm"] == "shared"

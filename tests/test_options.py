@@ -1,10 +1,11 @@
 """The options of single values, there and back."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
-from hcpg import presets
+from hcpg import cli, presets, registry
 from hcpg.commands.options import overridden
 from hcpg.presets import differences
 
@@ -33,3 +34,16 @@ def test_the_options_of_a_difference_make_it_again(part, changed, options):
 
 def test_another_adapter_is_an_option_too():
     assert differences(replace(USUAL, adapter="contact")) == ["--adapter", "contact"]
+
+
+@pytest.mark.parametrize("option", [("--preset", "q_guided"), ("--selector.rule", "value_soft")])
+def test_training_refuses_a_selector_that_ranks_by_a_critic_the_method_lacks(
+    option, tmp_path, monkeypatch, capsys
+):
+    """Before anything starts: there is not even a run folder."""
+    without_critic = SimpleNamespace(Config=registry.method("sac_flow").Config, METHOD=type("Cloned", (), {}))
+    monkeypatch.setattr(registry, "method", lambda _: without_critic)
+    command = ["train", "--task", "point/reach", "--out", str(tmp_path), *option]
+    assert cli.main(command) == 2
+    assert "'sac_flow' has no critic" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import fields, replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -102,6 +103,15 @@ def test_at_the_papers_budget_the_methods_own_defaults_hold():
     for preset in ("hcpg_flow", "sac_flow", "sac", "flowrl"):
         chosen = presets.settings("point/carry", preset, "paper")
         assert chosen.learner == registry.method(chosen.method).Config()
+
+
+def test_the_page_on_baselines_names_every_preset_and_one_short_run_of_each_is_stored():
+    docs = Path(__file__).parents[1] / "docs"
+    page = (docs / "baselines.md").read_text()
+    stored = (docs / "evidence/every_preset/README.md").read_text()
+    shown = {row.split("|")[2].strip() for row in stored.splitlines() if row.startswith("| point/reach ")}
+    assert {name for name in PRESETS if f"`{name}`" not in page} == set()
+    assert set(PRESETS) == shown
 
 
 def test_overrides_name_real_settings_of_real_budgets():

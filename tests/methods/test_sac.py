@@ -157,3 +157,5 @@ def test_the_defaults_are_the_classical_recipe():
     state = jax.eval_shape(SAC(config, Spec(39, 4)).init, jax.random.key(0))
     layers = state.actor.network.layers
     assert [layer.kernel.shape for layer in layers] == [(39, 256), (256, 256), (256, 256), (256, 8)]
+    twins = [layer.kernel.shape for layer in state.critic.networks.layers]
+    assert twins == [(2, 43, 256), (2, 256, 256), (2, 256, 256), (2, 256, 1)]

@@ -17,7 +17,7 @@ from scipy import stats
 from hcpg.methods.sac_flow import POLICY_METRICS, Config, SACFlow, State
 from hcpg.networks.batch_renorm import Moments
 from hcpg.networks.critics import CriticState
-from hcpg.networks.flow import Noise
+from hcpg.networks.flow import Noise, Path
 from hcpg.types import Batch, Spec
 
 ROWS, OBSERVATIONS, ACTIONS = 8, 5, 3
@@ -240,6 +240,22 @@ def test_proposals_of_one_set_are_independent_and_alike_in_distribution(pairs):
     assert pairs.shape == (2000, 2, ACTIONS)
     assert float(abs(pairs).max()) <= 1.0
     assert float(pairs.std(axis=0).min()) > 0.1
+
+
+def test_proposals_of_one_set_share_no_number_of_their_noise():
+    """Start and all four steps, of four proposals with three actions each: 60 different draws."""
+    drawn = []
+
+    class Watched:
+        def infer(self, moments, observations, noise):
+            drawn.append(np.concatenate([noise.start[None], noise.steps]))
+            return Path(jnp.tanh(noise.start), jnp.zeros(4))
+
+    state = moved_state("crossq")._replace(actor=Watched())
+    method_of("crossq").propose(state, BATCH.observations[0], jax.random.key(3), 4)
+    [noise] = drawn
+    assert noise.shape == (5, 4, ACTIONS)
+    assert len(np.unique(noise)) == 60
 
 
 def test_the_evaluation_action_is_the_single_proposal_bit_for_bit():
