@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from hcpg.loops.manifest import collect, hardware, versions
+from hcpg.loops.manifest import collect, command, hardware, versions
 
 
 def test_collect_goes_through_json_unchanged(monkeypatch):
@@ -54,3 +54,16 @@ def test_hardware_agrees_with_the_system():
         total_kib = int(file.readline().split()[1])
     assert found["memory_gib"] == pytest.approx(total_kib / 2**20, abs=0.1)
     assert found["accelerator"] is None
+
+
+@pytest.mark.parametrize(
+    ("program", "told"),
+    [
+        ("/a/.venv/bin/hcpg", "hcpg train x"),
+        ("/a/src/hcpg/__main__.py", "hcpg train x"),  # as `hcpg experiment` starts its jobs
+        ("scripts/demo.py", "demo.py train x"),
+    ],
+)
+def test_the_command_does_not_tell_where_the_program_lies(program, told, monkeypatch):
+    monkeypatch.setattr(sys, "argv", [program, "train", "x"])
+    assert command() == told

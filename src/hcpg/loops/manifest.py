@@ -39,7 +39,7 @@ def collect(
     """
     return {
         "time": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
-        "command": shlex.join(sys.argv),
+        "command": command(),
         "versions": versions(),
         "code": own_code(),
         "platform": platform.platform(),
@@ -50,6 +50,12 @@ def collect(
         "evaluation_starts": [int(start) for start in evaluation_starts],
         "selectors": {"training": dict(training_selector), "evaluation": dict(evaluation_selector)},
     }
+
+
+def command() -> str:
+    """This process's command line, without where the program lies on this machine."""
+    program = Path(sys.argv[0]).name
+    return shlex.join(["hcpg" if program == "__main__.py" else program, *sys.argv[1:]])
 
 
 def versions() -> dict[str, str]:
