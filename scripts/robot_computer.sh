@@ -1,24 +1,30 @@
 #!/usr/bin/env bash
-# A robot's computer, as far as Python goes: a fresh environment with NumPy, safetensors and this package without
-# extras, in which an exported policy is loaded, timed at 30 Hz, and run through the control loop on the point arm.
+# A robot's computer, as far as Python goes: an environment with NumPy, safetensors and this package without extras,
+# in which an exported policy is loaded, timed at 30 Hz, and run through the control loop on the point arm.
 #
-#   scripts/robot_computer.sh docs/evidence/export/policy [SECONDS]
+#   scripts/robot_computer.sh FOLDER [SECONDS [ENVIRONMENT]]
+#
+# ENVIRONMENT is made if it is not there; without it, a new one is made and removed again.
 set -euo pipefail
 root="$(cd "$(dirname "$0")/.." && pwd)"
 policy="$(realpath "$1")"
 seconds="${2:-60}"
 place="$(mktemp -d)"
 trap 'rm -rf "$place"' EXIT
+environment="${3:-$place/venv}"
 
-python3 -m venv "$place/venv"
-"$place/venv/bin/pip" install --quiet --disable-pip-version-check "safetensors>=0.8,<0.9" "$root"
+if [[ ! -x "$environment/bin/hcpg" ]]; then
+  python3 -m venv "$environment"
+  "$environment/bin/pip" install --quiet --disable-pip-version-check "safetensors>=0.8,<0.9" "$root"
+fi
+ln -s "$policy" "$place/policy"
 cd "$place"  # away from the checkout, so that nothing of it can be imported
 
 show() {
   echo "\$ $*"
-  "$place/venv/bin/$@" 2>&1 || echo "(exit code $?)"
+  "$environment/bin/$1" "${@:2}" 2>&1 || echo "(exit code $?)"
 }
 show pip list --disable-pip-version-check
 show python -c "import jax"
-show python -m hcpg.loops.control.deployed "$policy" --seconds "$seconds"
-show hcpg robot run point/reach --robot point --policy "$policy" --episodes 20 --out "$place/run"
+show python -m hcpg.loops.control.deployed policy --seconds "$seconds"
+show hcpg robot run point/reach --robot point --policy policy --episodes 20 --out run

@@ -231,3 +231,9 @@ def test_latency_is_what_the_clock_says(exported):
     # From the look before an action to the one after it passes 1 ms; ticks 0 to 30 begin within a second.
     assert (found.calls, found.p50_ms, found.p99_ms) == (31, pytest.approx(1.0), pytest.approx(1.0))
     assert found.timing.skipped == 0
+
+
+def test_a_policy_that_was_exported_long_ago_still_acts_as_it_did():
+    policy = Policy.load(Path(__file__).parents[4] / "docs/evidence/export/policy")
+    assert policy.facts["origin"]["step"] == 4000
+    assert policy.deviation < 1e-6
