@@ -27,7 +27,7 @@ from hcpg.loops.streams import Stream, key
 from hcpg.loops.trained import Trained
 from hcpg.presets import Settings
 from hcpg.report.durable import replace_json
-from hcpg.report.rows import read_rows
+from hcpg.report.rows import complete_lines
 from hcpg.types import Float
 
 FACTS = "learning.json"
@@ -221,7 +221,8 @@ class OnlineRun:
 def _episodes(logs: list[Path]) -> dict[int, list[dict[str, Any]]]:
     """The ticks of every episode in which something was executed, by the episode's number."""
     found: dict[int, list[dict[str, Any]]] = {}
-    for row in (row for log in logs for row in read_rows(log)):
+    lines = (line for log in logs for line in complete_lines(log).splitlines())
+    for row in map(json.loads, lines):
         if row["kind"] == "step":
             found.setdefault(row["episode"], []).append(row)
     return {number: rows for number, rows in found.items() if any(row["executed"] for row in rows)}
