@@ -127,8 +127,10 @@ def _chosen(choice: Mapping[str, Any] | None) -> Chosen | None:
     """Numbers that were not finite are null in a log."""
     if choice is None or choice["unfit"]:
         return None
-    arrays = (np.array(choice[name], float) for name in ("proposals", "weights", "scores"))
-    return Chosen(*arrays, _number(choice["phase"]), _number(choice["spread"]))
+    proposals, weights, scores = (
+        np.array(choice[name], float) for name in ("proposals", "weights", "scores")
+    )
+    return Chosen(proposals, weights, scores, _number(choice["phase"]), _number(choice["spread"]))
 
 
 def _number(value: float | None) -> float:

@@ -70,7 +70,9 @@ def _still(stream: "RecordingStream", trial: LoggedTrial, posing: Posing | None)
     stream.log("world/path", path, static=True)
     for shape in posing.shapes() if posing is not None else ():
         entity = f"{ARM}/{shape.body}/{shape.name}"
-        place = rerun.Transform3D(translation=shape.pose.position, quaternion=shape.pose.quaternion)
+        place = rerun.Transform3D(
+            translation=shape.pose.position, quaternion=rerun.Quaternion(xyzw=shape.pose.quaternion)
+        )
         stream.log(entity, place, static=True)
         stream.log(entity, _drawn(shape), static=True)
 
@@ -108,7 +110,9 @@ def _moved(stream: "RecordingStream", tick: LoggedTick, posing: Posing | None) -
     if posing is not None:
         posing.pose(tick.joint_angles, tick.width_m, tick.sights)
         for name, pose in posing.bodies():
-            place = rerun.Transform3D(translation=pose.position, quaternion=pose.quaternion)
+            place = rerun.Transform3D(
+                translation=pose.position, quaternion=rerun.Quaternion(xyzw=pose.quaternion)
+            )
             stream.log(f"{ARM}/{name}", place)
     tcp = rerun.Points3D([tick.position], colors=[TOOL], radii=0.006, labels=["TCP"])
     stream.log("world/tcp", tcp)

@@ -106,10 +106,10 @@ class Posing:
             first, count = mesh.vertadr[0], mesh.vertnum[0]
             vertices = model.mesh_vert[first : first + count].astype(float)
             faces = model.mesh_face[mesh.faceadr[0] : mesh.faceadr[0] + mesh.facenum[0]].astype(int)
-        rgb = tuple(int(255 * each) for each in color[:3])
+        red, green, blue = (int(255 * each) for each in color[:3])
         own = model.geom(geom).name or f"{kind}_{geom}"
         body = self._body_name(int(model.geom_bodyid[geom]))
-        return Shape(body, own, kind, pose, model.geom_size[geom].copy(), vertices, faces, rgb)
+        return Shape(body, own, kind, pose, model.geom_size[geom].copy(), vertices, faces, (red, green, blue))
 
     def _body_name(self, body: int) -> str:
         return self.model.body(body).name
