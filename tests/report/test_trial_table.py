@@ -25,17 +25,17 @@ def bounds(successes, trials):
 
 def test_each_cell_is_counted_from_the_ledger(table):
     rugby = table.cells["franka/rugby-grasp", "hcpg_flow"]
-    assert (rugby.count, rugby.steps, rugby.deviation) == ((14, 15), 43.0, 0.0)
+    assert (rugby.tally, rugby.steps, rugby.deviation) == ((14, 15), 43.0, 0.0)
     assert tuple(rugby.rate) == pytest.approx(bounds(14, 15))
     # One failure counts 200: (14 * 43 + 200) / 15.
     assert rugby.capped == pytest.approx(802 / 15)
     peg = table.cells["franka/peg-insertion", "sac_flow"]
-    assert (peg.count, peg.steps, peg.capped) == ((15, 15), 30.0, 30.0)
+    assert (peg.tally, peg.steps, peg.capped) == ((15, 15), 30.0, 30.0)
 
 
 def test_overall_pools_the_trials_and_averages_the_tasks_steps(table):
     ours, theirs = table.cells[OVERALL, "hcpg_flow"], table.cells[OVERALL, "sac_flow"]
-    assert (ours.count, theirs.count) == ((29, 30), (25, 30))
+    assert (ours.tally, theirs.tally) == ((29, 30), (25, 30))
     assert (ours.steps, theirs.steps) == (33.5, 45.0)
     assert tuple(ours.rate) == pytest.approx(bounds(29, 30))
 
@@ -71,7 +71,7 @@ def test_what_does_not_count_is_left_out(tmp_path):
     extra = [{"row": "judged", "trial": 1, "attempt": 1, "operator": None, "invalid": "the operator: caught"}]
     write_study(tmp_path / "a", "point/reach", {"ours": [5, -1, 7]}, extra=extra)
     cell = trial_table(find_studies(tmp_path)).cells["point/reach", "ours"]
-    assert (cell.count, cell.steps) == ((1, 2), 7.0)
+    assert (cell.tally, cell.steps) == ((1, 2), 7.0)
 
 
 def test_a_twin_and_an_arm_are_never_in_one_table(tmp_path):

@@ -42,9 +42,9 @@ def _marks(axes: "Axes", table: TrialTable, what: str) -> None:
         known = [(x, table.cells[task, policy]) for x, task in enumerate(table.tasks)
                  if (task, policy) in table.cells]  # fmt: skip
         across = [x + aside for x, _ in known]
-        values = [100 * cell.count.rate if what == "rate" else cell.capped for _, cell in known]
-        lower = [100 * (cell.count.rate - cell.rate.low) if what == "rate" else 0.0 for _, cell in known]
-        upper = [100 * (cell.rate.high - cell.count.rate) if what == "rate" else 0.0 for _, cell in known]
+        values = [100 * cell.tally.rate if what == "rate" else cell.capped for _, cell in known]
+        lower = [100 * (cell.tally.rate - cell.rate.low) if what == "rate" else 0.0 for _, cell in known]
+        upper = [100 * (cell.rate.high - cell.tally.rate) if what == "rate" else 0.0 for _, cell in known]
         look = {"color": looks[policy].color, "marker": looks[policy].marker, "markersize": 4.5}
         # Rounding may leave a bound a hair on the wrong side of a rate of 0 or 1.
         bars = np.maximum([lower, upper], 0.0)

@@ -69,7 +69,7 @@ def as_csv(table: TrialTable) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)
     for (task, policy), cell in table.cells.items():
-        numbers = [*cell.count, *cell.rate, cell.steps, cell.deviation, cell.capped]
+        numbers = [*cell.tally, *cell.rate, cell.steps, cell.deviation, cell.capped]
         texts = ["" if math.isnan(number) else number for number in numbers]
         writer.writerow([table.kind, table.served, task, policy, *texts, table.horizons.get(task, "")])
     return out.getvalue()
@@ -98,12 +98,12 @@ def _rows(table: TrialTable) -> list[list[str]]:
 
 def _texts(cell: Cell, planned: int | None) -> list[str]:
     """The cell's numbers; where trials are missing, of how many is said."""
-    missing = "" if planned in (None, cell.count.episodes) else f" (of {planned} planned)"
+    missing = "" if planned in (None, cell.tally.episodes) else f" (of {planned} planned)"
     low, high = cell.rate
     spread = "" if math.isnan(cell.deviation) else f" ± {cell.deviation:.1f}"
     return [
-        f"{cell.count.successes}/{cell.count.episodes}{missing}",
-        f"{100 * cell.count.rate:.1f}",
+        f"{cell.tally.successes}/{cell.tally.episodes}{missing}",
+        f"{100 * cell.tally.rate:.1f}",
         f"{100 * low:.1f} to {100 * high:.1f}",
         _ABSENT if math.isnan(cell.steps) else f"{cell.steps:.1f}{spread}",
         f"{cell.capped:.1f}",
@@ -114,8 +114,12 @@ def _contrasts(table: TrialTable) -> list[list[str]]:
     rows = []
     for each in table.contrasts:
         pair = f"{method_name(each.first)} - {method_name(each.second)}"
-        rows.append([_task(each.task), pair, *_estimate(each.difference), f"{each.p:.3f}"])
+        rows.append([_task(each.task), pair, *_estimate(each.difference), _p(each.p)])
     return rows
+
+
+def _p(value: float) -> str:
+    return "< 0.001" if value < 0.001 else f"{value:.3f}"
 
 
 def _estimate(found: Estimate) -> list[str]:

@@ -21,7 +21,7 @@ OVERALL = "Overall"
 class Cell(NamedTuple):
     """One policy on one task, or on all."""
 
-    count: Count
+    tally: Count
     rate: Interval
     """Wilson's, 95 %."""
     steps: float
@@ -90,7 +90,7 @@ def trial_table(studies: Sequence[Study]) -> TrialTable:
         planned={study.plan["task"]: study.plan["trials"] for study in studies},
         cells=cells,
         contrasts=[
-            Contrast(task, first, second, *_contrast(cells[task, first].count, cells[task, second].count))
+            Contrast(task, first, second, *_contrast(cells[task, first].tally, cells[task, second].tally))
             for task in [*tasks, OVERALL]
             for first, second in combinations(policies, 2)
             if (task, first) in cells and (task, second) in cells
@@ -120,7 +120,7 @@ def _cell(attempts: Sequence[Attempt], horizon: int) -> Cell:
 
 def _overall(cells: Sequence[Cell]) -> Cell:
     """Trials pooled, steps as the mean over tasks: as in the paper's last row."""
-    count = Count(sum(each.count.successes for each in cells), sum(each.count.episodes for each in cells))
+    count = Count(sum(each.tally.successes for each in cells), sum(each.tally.episodes for each in cells))
     steps, capped = (float(np.mean(each)) for each in zip(*((c.steps, c.capped) for c in cells), strict=True))
     return Cell(count, wilson(*count), steps, float("nan"), capped)
 
