@@ -120,6 +120,7 @@ def found(done: tuple[EpisodeResult, ...]) -> dict[str, Any]:
         "ticks": len(records),
         "minutes": (len(records) + sum(skipped)) / 30.0 / 60.0,
         "lateness_ms": shares(late_ms),
+        "planned_lateness_max_ms": max(episode.timing.lateness_max_ms for episode in done),
         "policy_ms": shares(policy_ms),
         "skipped": sum(skipped),
         "longest_gap": max(skipped),

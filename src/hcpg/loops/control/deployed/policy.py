@@ -136,5 +136,7 @@ def selector_from(settings: Mapping[str, Any]) -> Selector:
     unknown = sorted(set(settings) - {field.name for field in fields(Selector)})
     if unknown:
         raise PolicyFolderError(f"the selector has unknown settings: {', '.join(unknown)}. {AGAIN}")
-    plain = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
+    plain: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()
+    }
     return Selector(**plain)
