@@ -97,8 +97,12 @@ def run(folder, rig=None, kill_at=None, strike_at=None, robot=None):
 
 
 def executed_in_logs(folder):
-    lines = [line for log in folder.path.glob("steps_*.jsonl") for line in log.read_text().splitlines()]
-    return sum(row["kind"] == "step" and row["executed"] is not None for row in map(json.loads, lines))
+    """Every action that any sitting's log has, in order."""
+    lines = [
+        line for log in sorted(folder.path.glob("steps_*.jsonl")) for line in log.read_text().splitlines()
+    ]
+    rows = [row for row in map(json.loads, lines) if row["kind"] == "step" and row["executed"] is not None]
+    return [row["executed"] for row in rows]
 
 
 def newest(folder):
@@ -120,7 +124,7 @@ def both(tmp_path_factory):
 @pytest.mark.parametrize("preset", ["hcpg_flow", "sac_flow"])
 def test_the_budget_is_spent_to_the_action_and_updates_follow_from_it(both, preset):
     folder, done = both[0][preset], both[1][preset]
-    assert sum(each.actions for each in done.episodes) == BUDGET == executed_in_logs(folder)
+    assert sum(each.actions for each in done.episodes) == BUDGET == len(executed_in_logs(folder))
     progress, kept = newest(folder)
     assert (progress.executed, progress.updates) == (BUDGET, BUDGET * PER_ACTION)
     assert len(kept["['rewards']"]) == BUDGET
@@ -154,7 +158,7 @@ def broken(tmp_path_factory):
     folder, rig = begun(tmp_path_factory.mktemp("broken")), new_rig()
     with pytest.raises(KilledError):
         run(folder, kill_at=25)
-    first = newest(folder)[0].executed, executed_in_logs(folder)
+    first = newest(folder)[0].executed, len(executed_in_logs(folder))
     robot = FaultyRobot(rig.robot)
     done = run(folder, rig._replace(robot=robot), strike_at=10, robot=robot)
     patch.undo()
@@ -165,12 +169,10 @@ def test_a_kill_in_the_middle_of_an_episode_loses_nothing_and_refunds_nothing(br
     folder, first, done = broken
     assert first == (0, 25)  # no checkpoint has the 25 actions of the episode that did not end; the log has
     assert sum(each.actions for each in done.episodes) == BUDGET - 25
-    assert executed_in_logs(folder) == BUDGET
+    assert len(executed_in_logs(folder)) == BUDGET
     progress, kept = newest(folder)
     assert (progress.executed, progress.updates) == (BUDGET, BUDGET * PER_ACTION)
-    logged = [row for log in sorted(folder.path.glob("steps_*.jsonl")) for row in map(json.loads, log.open())]
-    executed = [row["executed"] for row in logged if row["kind"] == "step" and row["executed"] is not None]
-    np.testing.assert_array_equal(kept["['actions']"], np.asarray(executed, np.float32))
+    np.testing.assert_array_equal(kept["['actions']"], np.asarray(executed_in_logs(folder), np.float32))
     lost = folder.rows("episodes")[0]
     assert (lost["start"], lost["length"], lost["ended"]) == (1_050_000, 25, "lost")
     assert done.episodes[0].start == 1_050_001  # an episode's start state is not given twice

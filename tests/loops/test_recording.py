@@ -14,7 +14,7 @@ from hcpg.loops.demonstrations import DemonstrationError
 from hcpg.loops.recording import FIRST_START, NOISE, SPEEDS, Expert, Order, Paced, Source
 from hcpg.robots.point import JumpingClock
 
-ORDER = Order("point/reach", "point", "twin", count=3, seed=2)
+ORDER = Order("point/reach", "point", "twin", wanted=3, seed=2)
 TASK = ORDER.task
 
 
@@ -82,7 +82,7 @@ def test_a_folder_with_something_in_it_is_left_alone(recorded):
 def test_failures_are_counted_and_not_kept(tmp_path):
     still = Source(nullcontext(lambda observation, count, draw: np.zeros((count, 4))), {"name": "nobody"})
     with pytest.raises(DemonstrationError, match="0 of 4 episodes succeeded, 2 were wanted"):
-        record(tmp_path / "none", ORDER._replace(count=2), still)
+        record(tmp_path / "none", ORDER._replace(wanted=2), still)
     manifest = json.loads((tmp_path / "none" / "manifest.json").read_text())
     assert (manifest["episodes"], len(manifest["not_kept"])) == ([], 4)
     with pytest.raises(DemonstrationError, match=r"no demonstration in .* succeeded"):

@@ -19,6 +19,7 @@ from hcpg.loops.runs import RunFolder
 from hcpg.loops.runs_axis import stack, take
 from hcpg.loops.sitting import create_folders
 from hcpg.loops.streams import Stream, key
+from hcpg.networks.descent import descend
 from hcpg.networks.flow import FlowActor, Noise
 from hcpg.networks.matching import bridge, end_points, matching_loss
 from hcpg.presets import Settings
@@ -99,8 +100,8 @@ def matched(
         gradient, (moments, metrics) = slope(
             progress.actor, progress.moments, observations, path, recipe.deviation
         )
-        change, optimizer = adam.update(gradient, progress.optimizer)
-        return Progress(optax.apply_updates(progress.actor, change), moments, optimizer), metrics
+        actor, optimizer = descend(adam, gradient, progress.optimizer, progress.actor)
+        return Progress(actor, moments, optimizer), metrics
 
     @partial(jax.jit, donate_argnums=0)
     def advance(progress: Progress, batches: tuple[Array, Array, Array]) -> tuple[Progress, dict[str, Array]]:
@@ -119,9 +120,9 @@ def matched(
     return progress.actor, progress.moments, {name: float(value) for name, value in metrics.items()}
 
 
-def warmed_up(method: Method, state: Any, shown: Batch, recipe: Recipe, seed: int) -> Any:
+def warmed_up(method: Any, state: Any, shown: Batch, recipe: Recipe, seed: int) -> Any:
     """The state after learning values from the demonstrations; the actor and the temperature stay."""
-    never = type(method)(replace(method.config, policy_delay=np.iinfo(np.int32).max), method.spec)
+    never = replace(method, config=replace(method.config, policy_delay=np.iinfo(np.int32).max))
     rows = len(shown.rewards)
     part = {name: np.asarray(values) for name, values in shown._asdict().items()}
     ring = replay.refill(replay.create(1, rows, method.spec), [part], rows)

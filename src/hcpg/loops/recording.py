@@ -47,8 +47,8 @@ class Order(NamedTuple):
     robot: str
     kind: str
     """`Kind` of what moves."""
-    count: int
-    """Demonstrations wanted; only episodes that succeed count."""
+    wanted: int
+    """Demonstrations; only episodes that succeed count."""
     seed: int
 
 
@@ -115,8 +115,8 @@ class Recorder:
     def starts(self) -> Iterator[int]:
         """Start states, until enough episodes are kept or too many were tried."""
         first = FIRST_START + 1000 * self._order.seed
-        for attempt in range(ATTEMPTS * self._order.count):
-            if self._folder.kept == self._order.count:
+        for attempt in range(ATTEMPTS * self._order.wanted):
+            if self._folder.kept == self._order.wanted:
                 return
             yield first + attempt
 
@@ -136,9 +136,9 @@ def record(order: Order, rig: Rig, source: Source, path: Path, command: str) -> 
         chooser = Chooser(paced, ALONE, facts.adapters["paper"], task.action_size, order.seed)
         session = Session.of(rig, task, chooser, path / "steps.jsonl", facts.horizon)
         done = session.run(recorder.starts(), "evaluate", recorder)
-    if folder.kept < order.count and not done.ended:
+    if folder.kept < order.wanted and not done.ended:
         raise DemonstrationError(
-            f"{folder.kept} of {len(done.episodes)} episodes succeeded, {order.count} were wanted. "
+            f"{folder.kept} of {len(done.episodes)} episodes succeeded, {order.wanted} were wanted. "
             f"They are in {path}; look at the others' steps there before recording again."
         )
     return done

@@ -62,7 +62,7 @@ def matching_loss(
     learning, moments = _errors(actor, moments, observations, path, deviation, BatchRenorm.train)
     settled = jax.lax.stop_gradient(moments)
     acting, _ = _errors(actor, settled, observations, path, deviation, at_rest)
-    loss = sum(each.sum() for each in (learning, acting))
+    loss = learning.sum() + acting.sum()
     metrics = {
         "matching_loss": acting[0],
         "matching_loss_in_learning": learning[0],
