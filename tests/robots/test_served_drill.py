@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from hcpg import cli
+from hcpg.loops.control.drill import Site
 from hcpg.loops.control.drill_processes import Controller, process_faults
 from hcpg.twin.keeping import KeptTwin
 from hcpg.twin.launching import is_installed
@@ -73,7 +74,7 @@ def test_each_fault_asks_the_controller_for_what_it_says():
     assert isinstance(KeptTwin("button-press", ADDRESS, 0, Path("unused")), Controller)
     faults = process_faults(controller)
     for name in ("server_killed", "server_restarted", "server_frozen_300_ms", "server_frozen_5_s"):
-        faults[name].inject(None)
+        faults[name].inject(object.__new__(Site))  # which these faults do not touch
     assert controller.asked == ["kill", "kill", ("start", 0.0), ("freeze", 0.3), ("freeze", 5.0)]
 
 
