@@ -18,7 +18,6 @@ OTHERS = 300
 # An episode has at most one reward of 1, so the temperature begins where entropy does not drown it; critics
 # with LayerNorm and targets, since thousands of updates see a few hundred actions (docs/robot_learning.md).
 LEARNER = {
-    "critic": "polyak",
     "critic_learning_rate": 3e-4,
     "actor_learning_rate": 1e-4,
     "temperature_learning_rate": 3e-4,
@@ -28,6 +27,8 @@ LEARNER = {
     "policy_delay": 2,
     "discount": 0.97,
 }
+FLOW_LEARNER = {"critic": "polyak"}
+"""Of a method whose actor is a flow; the others have no such critic."""
 
 
 def settings(task: str, preset: str, actions: int | None = None, updates_per_action: int = 4) -> Settings:
@@ -37,7 +38,8 @@ def settings(task: str, preset: str, actions: int | None = None, updates_per_act
         UnknownNameError: the preset does not exist.
     """
     usual = presets.settings(task, preset, "cpu")
-    learner = {name: value for name, value in LEARNER.items() if hasattr(usual.learner, name)}
+    served = {**LEARNER, **(FLOW_LEARNER if hasattr(usual.learner, "flow_steps") else {})}
+    learner = {name: value for name, value in served.items() if hasattr(usual.learner, name)}
     steps = PAPER_ACTIONS.get(task, OTHERS) if actions is None else actions
     budget = Budget(
         "arm",

@@ -19,6 +19,7 @@ from hcpg.loops.runs import RunFolder
 from hcpg.loops.runs_axis import stack, take
 from hcpg.loops.sitting import create_folders
 from hcpg.loops.streams import Stream, key
+from hcpg.networks.batch_renorm import WARMUP_CALLS, Moments
 from hcpg.networks.descent import descend
 from hcpg.networks.flow import FlowActor, Noise
 from hcpg.networks.matching import bridge, end_points, matching_loss
@@ -109,7 +110,7 @@ def matched(
         return progress, jax.tree.map(jnp.mean, history)
 
     fresh = jax.tree.map(jnp.copy, actor)  # the compiled steps consume what they are given
-    progress, metrics = Progress(fresh, fresh.moments(), adam.init(fresh)), {}
+    progress, metrics = Progress(fresh, _settled(fresh.moments()), adam.init(fresh)), {}
     for first in range(0, recipe.steps, CHUNK):
         # Drawn out here, so that one compiled program serves any number of demonstrations.
         random = np.random.default_rng([seed, Stream.CLONING, first])
@@ -118,6 +119,19 @@ def matched(
             progress, (first + np.arange(CHUNK), shown.observations[rows], ends[rows])
         )
     return progress.actor, progress.moments, {name: float(value) for name, value in metrics.items()}
+
+
+def _settled(moments: Any) -> Any:
+    """The moments with batch renorm's correction on from the start: what learns is then what acts.
+
+    Before it, a step is normalised by its own batch while learning and by the moments of all steps while
+    acting; one network cannot match both.
+    """
+    return jax.tree.map(
+        lambda each: each._replace(calls=jnp.full_like(each.calls, WARMUP_CALLS)),
+        moments,
+        is_leaf=lambda node: isinstance(node, Moments),
+    )
 
 
 def warmed_up(method: Any, state: Any, shown: Batch, recipe: Recipe, seed: int) -> Any:
