@@ -8,7 +8,7 @@ from hcpg.loops.streams import EVALUATION_SEED, Stream, key, start_states
 
 def test_every_stream_of_every_seed_is_another():
     keys = [tuple(jax.random.key_data(key(seed, stream)).tolist()) for seed in range(5) for stream in Stream]
-    assert len(set(keys)) == 5 * 8
+    assert len(set(keys)) == 5 * 9
 
 
 def test_a_stream_is_the_same_every_time():
@@ -20,8 +20,9 @@ def test_the_numbers_of_the_streams_never_change():
     """A stream renumbered would change every run that was ever made."""
     assert [each.name for each in Stream] == [
         "NETWORKS", "WARMUP", "ACTOR", "SELECTOR", "REPLAY", "LEARNING", "STARTS", "EVALUATION",
+        "CLONING",
     ]  # fmt: skip
-    assert [int(each) for each in Stream] == list(range(8))
+    assert [int(each) for each in Stream] == list(range(9))
     assert EVALUATION_SEED == 1_000_003
 
 

@@ -194,7 +194,8 @@ def test_it_runs_with_numpy_and_safetensors_alone_and_only_reads_its_folder(fold
     np.testing.assert_allclose([float(number) for number in action.split()], here, atol=1e-6)
     names = ["README.md", "manifest.json", "policy.json", "weights.safetensors"]
     assert touched == f"{[(name, 'r') for name in names]} []"
-    assert packages == "hcpg numpy safetensors"
+    # NumPy brings along the runtime of the compiler that built it.
+    assert set(packages.split()) - {"cython_runtime"} == {"hcpg", "numpy", "safetensors"}
 
 
 def test_its_command_times_it_without_jax(exported, bare_packages, tmp_path):
