@@ -11,7 +11,7 @@ from hcpg import registry
 from hcpg.methods import flowrl, qsm, sac, sac_flow
 from hcpg.types import Batch
 
-STRIDE_M, TRANSITIONS, ROWS, UPDATES = 0.02, 2048, 64, 800
+STRIDE_M, TRANSITIONS, ROWS, UPDATES = 0.02, 2048, 64, 1600
 BEST = np.array([0.5, -0.25, -0.75])
 """The move that brings the tool to the object; the gripper has no say."""
 SIZES = {"actor_hidden_size": 32, "critic_hidden_size": 32}
@@ -21,7 +21,10 @@ LEARNERS = {
     "sac": (sac, {**SIZES, **RATES, "initial_temperature": 1e-2}),
     "flowrl": (flowrl, {"hidden_size": 32, "learning_rate": 3e-3, "anchor_weight": 1e-3}),
     "qsm": (qsm, {**SIZES, **RATES, "gradient_scale": 5.0}),
-    "sac_flow": (sac_flow, {**SIZES, **RATES, "initial_temperature": 1e-6, "policy_delay": 1}),
+    "sac_flow": (
+        sac_flow,
+        {**SIZES, **RATES, "actor_learning_rate": 1e-3, "initial_temperature": 1e-6, "policy_delay": 1},
+    ),
 }
 
 
