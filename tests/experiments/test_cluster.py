@@ -93,8 +93,9 @@ def test_an_experiment_loses_a_node_and_ends_with_the_undisturbed_results(
     monkeypatch.setattr(engine, "POLL_S", 0.05)
     place = RayCluster(made.address, Needs(1, 0.0), send_s=0.2)
     assert place.room()
-    assert run(cells, tmp_path, place, told.append) == ([], None)
+    ended = run(cells, tmp_path, place, told.append)
     place.close()
+    assert ended == ([], None), (told, [log.read_text() for log in (tmp_path / "logs").iterdir()])
 
     assert 0 < lost[0] < LENGTH["steps"]
     assert sum("lost with node" in text for text in told) == 1

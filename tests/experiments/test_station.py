@@ -1,7 +1,9 @@
 """A job on a node, without Ray: what it sends, in what state it leaves its node."""
 
 import os
+import shutil
 import tempfile
+import threading
 import time
 from pathlib import Path
 
@@ -14,7 +16,7 @@ from hcpg.experiments.claims import is_locked, locked
 from hcpg.experiments.ledger import entries
 from hcpg.experiments.parcels import Parcel, land
 from hcpg.experiments.slots import core_slots
-from hcpg.experiments.station import Needs, Order, Station, StationError, sweep
+from hcpg.experiments.station import Needs, Order, Station, StationError, checkpoints, sweep
 from hcpg.experiments.units import command, units
 
 CORE = sorted(os.sched_getaffinity(0))[0]
@@ -88,3 +90,25 @@ def test_what_killed_jobs_left_is_swept_once_nobody_holds_it(tmp_path):
     assert set(tmp_path.iterdir()) - {tmp_path / "own"} == {folders["held"], folders["new"]}
     assert is_locked(folders["held"] / "lock")
     held.close()
+
+
+def test_checkpoints_are_found_while_their_trainer_makes_and_deletes_folders(tmp_path):
+    # Walking into every folder failed in 60 of 2,096 looks beside such a trainer: the job then counted as failed.
+    run = tmp_path / "point" / "reach" / "sac" / "s0" / "one"
+    (run / "checkpoints" / "step_000000032").mkdir(parents=True)
+    (run / "manifest.json").write_text("{}")
+    ended = threading.Event()
+
+    def write_and_delete():
+        while not ended.is_set():
+            (run / "checkpoints" / ".writing-step_000000064").mkdir()
+            shutil.rmtree(run / "checkpoints" / ".writing-step_000000064")
+
+    trainer = threading.Thread(target=write_and_delete)
+    trainer.start()
+    try:
+        for _ in range(1000):
+            assert checkpoints(tmp_path) == {run / "checkpoints" / "step_000000032"}
+    finally:
+        ended.set()
+        trainer.join()

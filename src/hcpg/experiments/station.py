@@ -140,7 +140,15 @@ class Station:
         return pack(self._root, find_runs(self._root), [self._log], self._sent)
 
     def _checkpoints(self) -> set[Path]:
-        return set(self._root.rglob("checkpoints/step_*"))
+        return checkpoints(self._root)
+
+
+def checkpoints(root: Path) -> set[Path]:
+    """Those of the runs under `root`, while a trainer makes and deletes folders there.
+
+    `rglob` would look into a folder half-written or half-deleted, and fail when it vanishes meanwhile.
+    """
+    return {path for run in find_runs(root) for path in (run / "checkpoints").glob("step_*")}
 
 
 def sweep(jobs: Path) -> None:
