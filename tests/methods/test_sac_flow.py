@@ -211,6 +211,11 @@ def test_a_norm_per_step_is_refused_for_fields_that_have_no_shared_one():
         Config(plain_norm="per_step")
 
 
+def test_raw_inputs_are_refused_for_critics_that_always_standardise():
+    with pytest.raises(ValueError, match=r"'polyak's alone, not that of 'crossq': choose"):
+        Config(polyak_inputs="raw")
+
+
 def test_the_defaults_are_the_official_recipe():
     config = Config()
     assert config.plain_norm == "shared"

@@ -154,3 +154,15 @@ def test_polyak_bootstraps_from_its_targets(polyak, batch, following):
     loss, (_, values) = recipe.loss(state.networks, state._replace(target=seven), batch, following)
     aim = batch.rewards + 0.9 * (1 - batch.terminated) * (7 + following.entropy_bonus)
     np.testing.assert_allclose(loss, 0.5 * np.square(values - aim).mean(axis=1).sum(), rtol=1e-5)
+
+
+def test_polyak_critics_see_where_inputs_lie_only_if_they_are_raw(polyak):
+    recipe, state = polyak
+    inputs = jnp.linspace(-2.0, 3.0, OBSERVATIONS + ACTIONS)[None]
+    moments = state.moments._replace(mean=inputs[0])  # centred: every standardised input is then 0
+    centred = state._replace(moments=moments)
+    at_zero = recipe._replace(raw=True).values(state, jnp.zeros_like(inputs))
+    np.testing.assert_allclose(recipe.values(centred, inputs), at_zero, atol=1e-6)
+    raw = recipe._replace(raw=True).values(centred, inputs)
+    np.testing.assert_array_equal(raw, recipe._replace(raw=True).values(state, inputs))
+    assert float(abs(raw - at_zero).max()) > 0.01

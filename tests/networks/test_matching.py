@@ -31,6 +31,14 @@ def test_without_noise_the_path_is_a_straight_line():
     np.testing.assert_allclose(path.samples[:, 0, 0], [-1.0, -0.5, 0.0, 0.5], atol=1e-6)
 
 
+def test_a_gate_stays_open_while_its_actor_is_cloned():
+    actor = GatedActor.create(jax.random.key(0), (2, 1), 8)
+    followed = actor.cloning_part(jax.tree.map(jnp.ones_like, actor))
+    assert [float(leaf.max()) for leaf in jax.tree.leaves(followed.field.gate)] == [0.0, 0.0]
+    size = sum(leaf.size for leaf in jax.tree.leaves(actor))
+    assert sum(float(leaf.sum()) for leaf in jax.tree.leaves(followed)) == size - (8 + 1)
+
+
 def test_the_loss_moves_the_running_moments_towards_the_batch():
     actor = GatedActor.create(jax.random.key(0), (2, 1), 8)
     observations = jnp.array([[3.0, 0.0], [5.0, 0.0]])

@@ -101,7 +101,8 @@ def matched(
         gradient, (moments, metrics) = slope(
             progress.actor, progress.moments, observations, path, recipe.deviation
         )
-        actor, optimizer = descend(adam, gradient, progress.optimizer, progress.actor)
+        followed = progress.actor.cloning_part(gradient)
+        actor, optimizer = descend(adam, followed, progress.optimizer, progress.actor)
         return Progress(actor, moments, optimizer), metrics
 
     @partial(jax.jit, donate_argnums=0)

@@ -36,6 +36,8 @@ class Config:
     """as_published: the path's density leaves out the deviation of the steps (decoder only)."""
     critic: Literal["crossq", "polyak"] = "crossq"
     """crossq: batch renorm, joint pass, no target network. polyak: LayerNorm, target networks."""
+    polyak_inputs: Literal["standardised", "raw"] = "standardised"
+    """standardised: by running moments. raw: as they come, as in LayerNorm critics elsewhere (polyak only)."""
     flow_steps: int = 4
     """Euler steps from noise to action."""
     actor_hidden_size: int = 512
@@ -67,9 +69,14 @@ class Config:
         """Refuse a setting that would change nothing, or what no code published.
 
         Raises:
-            ValueError: `density` is as_published for a field whose published density is right, or
-                `plain_norm` is set for another field.
+            ValueError: `density` is as_published for a field whose published density is right,
+                `plain_norm` is set for another field, or `polyak_inputs` for other critics.
         """
+        if self.polyak_inputs == "raw" and self.critic != "polyak":
+            raise ValueError(
+                f"polyak_inputs 'raw' is the critic 'polyak's alone, not that of {self.critic!r}: "
+                "choose critic 'polyak', or polyak_inputs 'standardised'"
+            )
         if self.density == "as_published" and self.velocity != "decoder":
             raise ValueError(
                 f"density 'as_published' is the velocity 'decoder's alone, not that of {self.velocity!r}: "
@@ -109,8 +116,11 @@ class SACFlow:
     @property
     def critics(self) -> Critics:
         """The critic recipe of the settings."""
-        size, rate = self.config.critic_hidden_size, self.config.target_rate
-        return CrossQ(size) if self.config.critic == "crossq" else Polyak(size, target_rate=rate)
+        config = self.config
+        if config.critic == "crossq":
+            return CrossQ(config.critic_hidden_size)
+        raw = config.polyak_inputs == "raw"
+        return Polyak(config.critic_hidden_size, target_rate=config.target_rate, raw=raw)
 
     def init(self, key: PRNGKeyArray) -> State:
         """Fresh networks and optimizers."""

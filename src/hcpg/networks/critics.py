@@ -114,13 +114,14 @@ class CrossQ(NamedTuple):
 class Polyak(NamedTuple):
     """LayerNorm critics with exponentially averaged target networks.
 
-    Their inputs are standardised by running moments, as batch renorm does for `CrossQ`: positions in metres
-    differ by centimetres where it matters.
+    Unless `raw`, their inputs are standardised by running moments, as batch renorm does for `CrossQ`: positions
+    in metres differ by centimetres where it matters.
     """
 
     hidden_size: int
     critics: int = 2
     target_rate: float = 0.005
+    raw: bool = False
 
     def init(self, key: PRNGKeyArray, inputs: int) -> CriticState:
         """N critics, and targets equal to them."""
@@ -149,7 +150,7 @@ class Polyak(NamedTuple):
 
     def _evaluate(self, networks: PyTree, state: CriticState, inputs: Float[Array, "B I"]) -> Values:
         evaluate = jax.vmap(_LayerNetwork.__call__, in_axes=(0, None))
-        return evaluate(networks, standardise(state.moments, inputs))
+        return evaluate(networks, inputs if self.raw else standardise(state.moments, inputs))
 
 
 class _RenormNetwork(eqx.Module):

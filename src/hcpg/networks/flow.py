@@ -73,6 +73,10 @@ class FlowActor(eqx.Module):
     ) -> tuple[Push, Any]:
         """What moves `sample` in step number `step`, and the moments after it."""
 
+    def cloning_part(self, gradient: "FlowActor") -> "FlowActor":
+        """What cloning follows of a gradient: all of it, where no part keeps the others from learning."""
+        return gradient
+
     def infer(self, moments: PyTree, observations: Float[Array, "*state O"], noise: Noise) -> Path:
         """Paths under the running statistics; `noise` may have more leading axes than needed."""
         return self._run(moments, observations, noise, at_rest, _no_nudges(noise))[0]

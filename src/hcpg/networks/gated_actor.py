@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax
+from jax import numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from hcpg.networks.dense import Dense
@@ -61,6 +62,15 @@ class GatedActor(FlowActor):
             GatedVelocity.create(of_field, *sizes, hidden_size),
             Deviation.create(of_deviation, *sizes, hidden_size),
         )
+
+    def cloning_part(self, gradient: "GatedActor") -> "GatedActor":
+        """All but the gate's, which stays as open as it is: the candidate alone can give any velocity.
+
+        Where actions come in two modes, the best constant velocity late in the path is none. A gate that
+        learns finds that first; and through a closed gate the candidate learns nothing any more.
+        """
+        gate = jax.tree.map(jnp.zeros_like, gradient.field.gate)
+        return eqx.tree_at(lambda actor: actor.field.gate, gradient, gate)
 
     def moments(self) -> FieldMoments:
         """Fresh statistics of observation and sample."""
