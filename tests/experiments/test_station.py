@@ -93,7 +93,7 @@ def test_what_killed_jobs_left_is_swept_once_nobody_holds_it(tmp_path):
 
 
 def test_checkpoints_are_found_while_their_trainer_makes_and_deletes_folders(tmp_path):
-    # Walking into every folder failed in 60 of 2,096 looks beside such a trainer; the job then counted as failed.
+    # Walking into every folder failed in 60 of 2,096 looks beside such a trainer, and the job with it.
     run = tmp_path / "point" / "reach" / "sac" / "s0" / "one"
     (run / "checkpoints" / "step_000000032").mkdir(parents=True)
     (run / "manifest.json").write_text("{}")

@@ -37,7 +37,7 @@ class Config:
     critic: Literal["crossq", "polyak"] = "crossq"
     """crossq: batch renorm, joint pass, no target network. polyak: LayerNorm, target networks."""
     polyak_inputs: Literal["standardised", "raw"] = "standardised"
-    """standardised: by running moments. raw: as they come, as in LayerNorm critics elsewhere (polyak only)."""
+    """standardised: by running moments. raw: as they come, as elsewhere (polyak only)."""
     flow_steps: int = 4
     """Euler steps from noise to action."""
     actor_hidden_size: int = 512

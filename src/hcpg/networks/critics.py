@@ -114,8 +114,8 @@ class CrossQ(NamedTuple):
 class Polyak(NamedTuple):
     """LayerNorm critics with exponentially averaged target networks.
 
-    Unless `raw`, their inputs are standardised by running moments, as batch renorm does for `CrossQ`: positions
-    in metres differ by centimetres where it matters.
+    Unless `raw`, their inputs are standardised by running moments, as batch renorm does for `CrossQ`:
+    positions in metres differ by centimetres where it matters.
     """
 
     hidden_size: int
