@@ -7,10 +7,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from hcpg import registry
 from hcpg.commands import robot_drill, robot_learning, robot_replay, robot_trials
 from hcpg.commands.arms import announced, arm_action
+from hcpg.commands.served_twin import add_serve, serving
 from hcpg.loops.control.choosing import Chooser
 from hcpg.loops.control.proposing import uniform
 from hcpg.loops.control.records import EpisodeResult
@@ -31,9 +33,10 @@ def run(arguments: Sequence[str]) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     """0 where the robot is ready."""
-    rig = announced(options)
-    with closing(rig.stage):
-        seen = watch(rig.robot, options.seconds)
+    with TemporaryDirectory() as folder, serving(options, Path(folder)):
+        rig = announced(options)
+        with closing(rig.stage):
+            seen = watch(rig.robot, options.seconds)
     sys.stdout.writelines(f"{line}\n" for line in _watched_lines(seen, options.seconds))
     if options.out is not None:
         options.out.write_text(json.dumps(plain(seen), indent=2) + "\n")
@@ -43,12 +46,13 @@ def _check(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     """0 where every episode was run, 128 + the signal where one stopped it, else 1."""
     chooser = _chooser(options)
-    rig, task = announced(options), registry.robot_task(options.task)
-    address = registry.task(options.task)
+    task, address = registry.robot_task(options.task), registry.task(options.task)
     options.out.mkdir(parents=True, exist_ok=True)
-    session = Session.of(rig, task, chooser, options.out / STEPS, options.horizon or address.horizon)
-    with closing(rig.stage):
-        done = session.run(range(options.start, options.start + options.episodes))
+    with serving(options, options.out):
+        rig = announced(options)
+        session = Session.of(rig, task, chooser, options.out / STEPS, options.horizon or address.horizon)
+        with closing(rig.stage):
+            done = session.run(range(options.start, options.start + options.episodes))
     kind = registry.robot(options.robot).kind
     sys.stdout.writelines(f"{kind}: {_episode_line(each)}\n" for each in done.episodes)
     sys.stdout.write(f"ended early: {done.ended}\n" if done.ended else "")
@@ -106,9 +110,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     actions = parser.add_subparsers(required=True, metavar="ACTION")
     check = arm_action(actions, "check", _check, "connect, check, hold still, let go")
+    add_serve(check)
     check.add_argument("--seconds", type=float, default=2.0, help="how long to hold; default: 2")
     check.add_argument("--out", type=Path, metavar="FILE", help="what was found, as JSON")
     play = arm_action(actions, "run", _run, "episodes of an exported policy, or of random proposals")
+    add_serve(play)
     play.add_argument("--policy", type=Path, metavar="FOLDER", help="what `hcpg export` wrote")
     play.add_argument("--selector", choices=RULES, default="hcpg")
     play.add_argument("--candidates", type=int, default=4, help="proposals per action (K); default: 4")

@@ -13,6 +13,7 @@ from hcpg import registry
 from hcpg.commands import choice
 from hcpg.commands.arms import announced, arm_action
 from hcpg.commands.scripted import expert
+from hcpg.commands.served_twin import add_serve, serving
 from hcpg.experiments import arm_budgets
 from hcpg.interfaces import Rig
 from hcpg.loops import demonstrations, recording
@@ -31,6 +32,7 @@ class LearnOptionsError(ValueError):
 def add(actions: "argparse._SubParsersAction") -> None:
     """Declare `demos`, `clone` and `learn`."""
     demos = arm_action(actions, "demos", _demos, "record demonstrations, through all limits")
+    add_serve(demos)
     demos.add_argument("--count", type=int, default=20, help="successful ones wanted; default: 20")
     demos.add_argument(
         "--source", choices=("expert", "keyboard", "gamepad"), default="expert",
@@ -49,6 +51,7 @@ def add(actions: "argparse._SubParsersAction") -> None:
     cloning.add_argument("--seed", type=int, default=0)
     cloning.add_argument("--out", type=Path, default=Path("runs"), help="where the run goes; default: runs")
     online = arm_action(actions, "learn", _learn, "learn on the arm under a budget of executed actions")
+    add_serve(online)
     online.add_argument("--initial", type=Path, metavar="RUN", help="the clone that every method starts from")
     online.add_argument("--demos", type=Path, metavar="DEMOS", help="half of every batch; never changed")
     online.add_argument(
@@ -65,10 +68,12 @@ def add(actions: "argparse._SubParsersAction") -> None:
 
 def _demos(options: argparse.Namespace) -> int:
     """0 where as many were recorded as wanted, 128 + the signal where one stopped it, else 1."""
-    rig, plugin = announced(options), registry.robot(options.robot)
+    plugin = registry.robot(options.robot)
     order = Order(options.task, options.robot, plugin.kind, options.count, options.seed)
-    with closing(rig.stage):
-        done = recording.record(order, rig, _source(options, order, rig), options.out, _command())
+    with serving(options, options.out.parent):
+        rig = announced(options)
+        with closing(rig.stage):
+            done = recording.record(order, rig, _source(options, order, rig), options.out, _command())
     good = sum(each.ended == "success" for each in done.episodes)
     sys.stdout.write(f"{plugin.kind}: {good} of {len(done.episodes)} episodes succeeded and are kept\n")
     sys.stdout.write(f"ended early: {done.ended}\n" if done.ended else "")
@@ -103,7 +108,7 @@ def _learn(options: argparse.Namespace) -> int:
 
     folder = _resumed(options) if options.resume else _begun(options)
     sys.stdout.write(f"{folder.path}\n")
-    with folder.lock():
+    with folder.lock(), serving(options, folder.path):
         rig = announced(options)
         with closing(rig.stage):
             done = online.OnlineRun(folder, rig, _say).run()

@@ -13,6 +13,7 @@ from hcpg import registry
 from hcpg.commands import choice
 from hcpg.commands.arms import announced
 from hcpg.commands.scripted import expert, referee_of
+from hcpg.commands.served_twin import add_serve, serving
 from hcpg.interfaces import Rig
 from hcpg.loops.control.choosing import Chooser
 from hcpg.loops.control.deployed.parcel import POLICY
@@ -22,9 +23,7 @@ from hcpg.loops.trials.operator import Console, Nobody, NobodyThereError
 from hcpg.loops.trials.plan import Plan, PlanError
 from hcpg.loops.trials.running import Arena, run_trials
 from hcpg.registry import UnknownNameError
-from hcpg.robots.twin import START_SEED
 from hcpg.selection import RULES, Selector
-from hcpg.twin.launching import served
 
 DESCRIPTION = """Try policies on one task of an arm or its twin: every policy from the same start states, in
 an order that is drawn, shown to the operator by codes alone. Give the same command again to go on after a
@@ -40,7 +39,7 @@ def add(actions: "argparse._SubParsersAction") -> None:
     add_option("task", metavar="TASK", nargs="?", help="as `hcpg list tasks` has it")
     add_option("--robot", help=f"one of: {', '.join(registry.names('robots'))}")
     add_option("--address", help="the controller's, where the robot has one")
-    add_option("--serve", action="store_true", help="serve the twin at ADDRESS while the trials run")
+    add_serve(parser)
     add_option("--policy", action="append", default=[], metavar="NAME=WHAT", help=_POLICY)
     add_option("--selector", action="append", default=[], metavar="NAME=RULE", help=_SELECTOR)
     add_option("--adapter", help="scene reader; default: the run's own, or paper")
@@ -70,7 +69,7 @@ def carry_out(options: argparse.Namespace) -> int:
     kind = registry.robot(options.robot).kind
     if options.unattended and kind != "twin":
         raise PlanError("only a twin runs unattended; somebody has to stand beside an arm")
-    with _served(options), _prepared(options):
+    with serving(options, options.out / options.task), _prepared(options):
         rig = announced(options)
         with closing(rig.stage):
             return _run(options, rig)
@@ -91,21 +90,6 @@ def _run(options: argparse.Namespace, rig: Rig) -> int:
     early = f"ended early: {progress.ended}; the same command goes on"
     sys.stdout.write(f"{early if progress.ended else 'all done'}\n")
     return int(bool(progress.ended)) if progress.signal is None else 128 + progress.signal
-
-
-@contextmanager
-def _served(options: argparse.Namespace) -> Iterator[None]:
-    """The twin, if it is to be served from here; its log lies beside the trials."""
-    if not options.serve:
-        yield
-        return
-    suite, _, name = options.task.partition("/")
-    if suite != "franka" or options.robot != "twin" or options.address is None:
-        raise PlanError("--serve serves a twin: give a task of franka, --robot twin and --address 127.0.0.1")
-    folder = options.out / options.task
-    folder.mkdir(parents=True, exist_ok=True)
-    with served(name, options.address, START_SEED, folder / "server.log"):
-        yield
 
 
 @contextmanager

@@ -45,7 +45,7 @@ class Recipe:
     steps: int = 5000
     """Of flow matching."""
     batch_size: int = 128
-    learning_rate: float = 1e-3
+    learning_rate: float = 3e-3
     """At the start; it falls to nothing along a cosine."""
     deviation: float = 0.1
     """Of the noise of every flow step, before tanh."""

@@ -24,8 +24,9 @@ TRAVEL_M = 0.012
 """From the button's top at rest to where it shall be."""
 ABOVE_M, STANDOFF_M = 0.015, 0.03
 """The fingertips are above the cap when this close to its axis; until then they stay this far above it."""
-PRESSED_M, CAP_M = 0.010, 0.025
-"""Success: the fingertips this far below the top at rest, no further than this from the button's axis."""
+PRESSED_M, CAP_M = 0.011, 0.025
+"""Success: the fingertips this far below the top at rest, no further than this from the button's axis. The
+press asked for is 10 mm; the touched-off top is uncertain by 0.3 mm, so 1 mm more leaves no doubt."""
 
 
 def read_contact_scene(observation: Float[Tensor, "*batch O"]) -> Scene:
