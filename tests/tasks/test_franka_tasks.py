@@ -114,9 +114,9 @@ def test_a_peg_counts_after_three_ticks_below_25_mm():
     assert answers("peg-insertion", [beside] * 4, hole) == [False] * 4
 
 
-def test_a_button_counts_at_once_below_10_mm_of_travel():
+def test_a_button_counts_at_once_from_11_mm_of_travel_on():
     button = {"button": seen([0.45, 0.0, 0.056])}
-    states = [snapshot([0.45, 0.0, 0.0545]), snapshot([0.45, 0.0, 0.0535]), snapshot([0.48, 0.0, 0.0535])]
+    states = [snapshot([0.45, 0.0, 0.0535]), snapshot([0.45, 0.0, 0.0525]), snapshot([0.48, 0.0, 0.0525])]
     assert answers("button-press", states, button) == [False, True, False]
 
 
