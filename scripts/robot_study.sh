@@ -12,7 +12,7 @@ twin=(--robot twin --address "$address" --serve)
 demos=$out/demos/$task clones=$out/clone/$task
 mkdir -p "$out/demos" "$clones"
 
-made() { find "$1" -name config.json -printf '%h\n' 2>/dev/null | sort | tail -n 1; }
+made() { if [ -d "$1" ]; then find "$1" -name config.json -printf '%h\n' | sort | tail -n 1; fi; }
 state() { python3 -c 'import json, sys; print(json.load(open(sys.argv[1] + "/status.json"))["state"])' "$1"; }
 
 case $step in
