@@ -15,6 +15,8 @@ ReadScene = Callable[[Float[Tensor, "*batch O"]], Scene]
 class Method(Protocol):
     """A learner bound to its `config` and `spec`; every call is pure.
 
+    It is hashable by both: programs compiled for it are kept.
+
     Its state is a NamedTuple that holds a field `updates`, the count of updates made. All runs of a
     population share that count, so it alone gets no run axis (and `lax.cond` on it stays a branch).
     """

@@ -8,6 +8,7 @@ from jax import numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from hcpg.interfaces import Method, ReadScene, Valued
+from hcpg.loops.once import once
 from hcpg.loops.runs_axis import axes_of, over_runs
 from hcpg.selection import Diagnostics, Selector, select
 from hcpg.types import Scene
@@ -29,6 +30,7 @@ class Considered(NamedTuple):
     diagnostics: Diagnostics
 
 
+@once
 def guided(method: Method, selector: Selector, read_scene: ReadScene) -> Callable[..., Chosen]:
     """A policy of the proposals: (state, observations [E, O], actor key, selector key) -> Chosen [E].
 
@@ -43,6 +45,7 @@ def guided(method: Method, selector: Selector, read_scene: ReadScene) -> Callabl
     return every
 
 
+@once
 def considered(method: Method, selector: Selector, read_scene: ReadScene) -> Callable[..., Considered]:
     """The same policy, for those who want to see it think: it acts bit for bit like `guided`.
 
@@ -66,6 +69,7 @@ def considered(method: Method, selector: Selector, read_scene: ReadScene) -> Cal
     return _per_environment(one)
 
 
+@once
 def bare(method: Method) -> Callable[..., Chosen]:
     """The method's own evaluation action; no selector. Same signature as `guided`."""
 
@@ -78,6 +82,7 @@ def bare(method: Method) -> Callable[..., Chosen]:
     return every
 
 
+@once
 def compiled(policy: Callable[..., Any], state_type: type, runs: int) -> Callable[..., Any]:
     """The policy for R runs: (states, observations [R, E, O], actor keys [R], selector keys [R], tick).
 
@@ -90,6 +95,7 @@ def compiled(policy: Callable[..., Any], state_type: type, runs: int) -> Callabl
     return jax.jit(over_runs(one_run, runs, (axes_of(state_type), 0, 0, 0, None)))
 
 
+@once
 def warmup(runs: int, environments: int, action_size: int) -> Callable[..., Chosen]:
     """Uniform actions in [-1, 1] that bypass the selector: (keys [R], tick) -> Chosen."""
 

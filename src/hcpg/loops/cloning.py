@@ -69,7 +69,7 @@ def clone(settings: Settings, shown: Demonstrations, recipe: Recipe, seed: int, 
     """
     task = registry.task(settings.task)
     method = registry.method(settings.method).METHOD(settings.learner, registry.suite(task.suite).spec(task))
-    state = jax.jit(method.init)(key(seed, Stream.NETWORKS))
+    state = learning.initial(method)(key(seed, Stream.NETWORKS))
     if not isinstance(getattr(state, "actor", None), FlowActor):
         raise NotClonableError(
             f"the method {settings.method!r} has no flow actor to be cloned; choose another --preset"

@@ -9,12 +9,20 @@ from jax import numpy as jnp
 from jaxtyping import Array, Bool, Float, Key
 
 from hcpg.interfaces import Method
+from hcpg.loops.once import once
 from hcpg.loops.replay import Draw, drawing
 from hcpg.loops.runs_axis import axes_of, over_runs
 
 Learn = Callable[..., tuple[Any, dict[str, Float[Array, " R"]], Bool[Array, " R"]]]
 
 
+@once
+def initial(method: Method) -> Callable[..., Any]:
+    """The method's fresh state from a key, compiled as one program instead of a hundred small ones."""
+    return jax.jit(method.init)
+
+
+@once
 def compiled(
     method: Method, state_type: type, runs: int, updates: int, batch_size: int, draw: Draw | None = None
 ) -> Learn:

@@ -14,13 +14,14 @@ import numpy as np
 from jaxtyping import Array
 
 from hcpg import presets, registry
-from hcpg.interfaces import Rig
-from hcpg.loops import checkpoints, online_learner
+from hcpg.interfaces import Method, Rig
+from hcpg.loops import checkpoints, learning, online_learner
 from hcpg.loops.control.choosing import Chooser
 from hcpg.loops.control.experience import Experience, experienced, recovered
 from hcpg.loops.control.records import EpisodeResult
 from hcpg.loops.control.sessions import Session, SessionResult
 from hcpg.loops.learner_process import LearnerProcess, Word
+from hcpg.loops.once import once
 from hcpg.loops.runs import RunFolder
 from hcpg.loops.sitting import create_folders, seed_of
 from hcpg.loops.streams import Stream, key
@@ -94,6 +95,16 @@ def facts_of(folder: RunFolder) -> dict[str, Any]:
     return json.loads(file.read_text())
 
 
+@once
+def proposing(method: Method) -> Callable[..., Array]:
+    """Proposals, compiled: (state, observation [O], count, root key, number of the draw) -> [count, A]."""
+
+    def propose(state: Any, observation: Array, count: int, root: Array, draw: Array) -> Array:
+        return method.propose(state, observation, jax.random.fold_in(root, draw), count)
+
+    return jax.jit(propose, static_argnums=2)
+
+
 class Policy:
     """The flow's proposals by the newest checkpoint; a draw depends on the seed and its number alone."""
 
@@ -101,13 +112,9 @@ class Policy:
         task = registry.task(settings.task)
         spec = registry.suite(task.suite).spec(task)
         method = registry.method(settings.method).METHOD(settings.learner, spec)
-        self._template = jax.jit(method.init)(key(seed, Stream.NETWORKS))
+        self._template = learning.initial(method)(key(seed, Stream.NETWORKS))
         self._root, self._state = key(seed, Stream.ACTOR), self._template
-
-        def propose(state: Any, observation: Array, count: int, draw: Array) -> Array:
-            return method.propose(state, observation, jax.random.fold_in(self._root, draw), count)
-
-        self._propose = jax.jit(propose, static_argnums=2)
+        self._propose = proposing(method)
         for count in (1, settings.selector.candidates):  # compiled before anything moves
             self(np.zeros(spec.observation_size, np.float32), count, 0)
 
@@ -119,7 +126,7 @@ class Policy:
         self, observation: Float[np.ndarray, " O"], count: int, draw: int
     ) -> Float[np.ndarray, "K A"]:
         """`count` proposals for one observation."""
-        return np.asarray(self._propose(self._state, observation, count, draw))
+        return np.asarray(self._propose(self._state, observation, count, self._root, draw))
 
 
 class OnlineRun:

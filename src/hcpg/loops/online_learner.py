@@ -73,7 +73,7 @@ class OnlineLearner:
         spec = registry.suite(task.suite).spec(task)
         method = registry.method(settings.method).METHOD(settings.learner, spec)
         seed, budget = seed_of(folder), settings.budget
-        template = jax.jit(method.init)(key(seed, Stream.NETWORKS))
+        template = learning.initial(method)(key(seed, Stream.NETWORKS))
         path = _newest(folder)
         trees, facts = checkpoints.load(path, {"state": template})
         self._online = {

@@ -4,10 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jax
-
 from hcpg import presets, registry
 from hcpg.interfaces import Method, ReadScene
+from hcpg.loops import learning
 from hcpg.loops.checkpoints import step_of
 from hcpg.loops.evaluation import BARE
 from hcpg.loops.runs import RunFolder
@@ -71,7 +70,7 @@ def load(path: Path, choice: Choice) -> Trained:
     method = registry.method(settings.method).METHOD(settings.learner, registry.suite(task.suite).spec(task))
     seed = seed_of(folder)
     step = choice.step if choice.step is not None or path.name[:5] != "step_" else step_of(path)
-    state, found = load_state(folder, jax.jit(method.init)(key(seed, Stream.NETWORKS)), step)
+    state, found = load_state(folder, learning.initial(method)(key(seed, Stream.NETWORKS)), step)
     name = BARE if choice.selector == BARE or selector.alone else selector.rule
     return Trained(folder, seed, settings, name, method, task.adapters[adapter], stack([state]), found)
 

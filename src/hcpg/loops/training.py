@@ -22,6 +22,8 @@ from hcpg.presets import Settings
 from hcpg.selection.arrays import namespace
 from hcpg.types import Batch, Tensor
 
+_STACK, _INSERT = jax.jit(stack), jax.jit(replay.insert, donate_argnums=0)
+
 
 class Position(NamedTuple):
     """Where a population is: all that changes while it trains."""
@@ -70,8 +72,8 @@ class Trainer:
         read_scene = task.adapters[settings.adapter]
         self.evaluator = Evaluator(settings, self.method, read_scene, seeds)
         self._keys = {each: jnp.stack([streams.key(seed, each) for seed in seeds]) for each in Stream}
-        fresh = jax.jit(self.method.init)  # compiled as one program instead of a hundred small ones
-        self._initial = jax.jit(stack)([fresh(key) for key in self._keys[Stream.NETWORKS]])
+        fresh = learning.initial(self.method)
+        self._initial = _STACK([fresh(key) for key in self._keys[Stream.NETWORKS]])
         self._compile(read_scene)
 
     def _compile(self, read_scene: Any) -> None:
@@ -81,7 +83,6 @@ class Trainer:
         self._warm = acting.warmup(runs, budget.environments, self.spec.action_size)
         updates = self.schedule.updates_per_tick
         self._learn = learning.compiled(self.method, state_type, runs, updates, budget.batch_size)
-        self._insert = jax.jit(replay.insert, donate_argnums=0)
 
     def pool(self) -> Pool:
         """The training environments: E of each run, with the run's own start states."""
@@ -162,7 +163,7 @@ class Trainer:
             arrival.next_observations,
             arrival.terminated.astype(np.float32),
         )
-        ring = self._insert(position.replay, jax.tree.map(self._per_run, brought))
+        ring = _INSERT(position.replay, jax.tree.map(self._per_run, brought))
         return position._replace(tick=tick, replay=ring, episodes=episodes, observations=arrival.observations)
 
     def _choose(self, position: Position) -> np.ndarray:
