@@ -115,12 +115,14 @@ class Policy:
         self._template = learning.initial(method)(key(seed, Stream.NETWORKS))
         self._root, self._state = key(seed, Stream.ACTOR), self._template
         self._propose = proposing(method)
-        for count in (1, settings.selector.candidates):  # compiled before anything moves
-            self(np.zeros(spec.observation_size, np.float32), count, 0)
+        self._nothing = np.zeros(spec.observation_size, np.float32)
+        self._counts = {1, settings.selector.candidates}
 
     def load(self, checkpoint: Path) -> None:
-        """Act by this checkpoint from now on."""
+        """Act by this checkpoint from now on; what it needs is compiled here, before anything moves."""
         self._state = checkpoints.load(checkpoint, {"state": self._template})[0]["state"]
+        for count in self._counts:
+            self(self._nothing, count, 0)
 
     def __call__(
         self, observation: Float[np.ndarray, " O"], count: int, draw: int
