@@ -14,10 +14,11 @@ from hcpg.loops.cloning import NotClonableError, Recipe
 from hcpg.loops.demonstrations import Demonstrations
 from hcpg.networks.flow import Noise
 from hcpg.networks.gated_actor import GatedActor
+from hcpg.networks.velocity import OPEN_GATE_BIAS
 from hcpg.types import Batch
 
 STEPS, ROWS, ASKED = 4, 512, 400
-RECIPE = Recipe(steps=1500, batch_size=256, learning_rate=3e-3, deviation=0.05)
+RECIPE = Recipe(steps=1000, batch_size=64, learning_rate=2e-2, deviation=0.05)
 
 
 def shown():
@@ -36,31 +37,37 @@ def cloned():
     return cloning.matched(actor, STEPS, shown(), RECIPE, seed=0)[:2]
 
 
-def noise():
-    return Noise.draw(jax.random.key(5), (ASKED, 2), STEPS)
+@pytest.fixture(scope="module")
+def sampled(cloned):
+    """What is seen, and the first and second numbers that the clone then gives: acting, and learning."""
+    noise = Noise.draw(jax.random.key(5), (ASKED, 2), STEPS)
+    acting, learning = np.full(ASKED, 0.8), np.linspace(-1, 1, ASKED)
+
+    @jax.jit
+    def both(actor, moments):
+        infer = actor.infer(moments, jnp.asarray(acting, jnp.float32)[:, None], noise)
+        return infer.actions, actor.train(moments, jnp.asarray(learning, jnp.float32)[:, None], noise)[
+            0
+        ].actions
+
+    return [
+        (seen, *np.asarray(found).T) for seen, found in zip((acting, learning), both(*cloned), strict=True)
+    ]
 
 
-def check(actions, seen):
-    """What follows from what is seen is hit; of the two ways both are taken, but they are blurred.
-
-    Four Euler steps of the exact velocity would bring 82 % of these paths within 0.15 of a way.
-    """
-    first, second = np.asarray(actions).T
+@pytest.mark.parametrize("mode", [0, 1], ids=["acting", "learning"])
+def test_it_takes_both_ways_shown_and_hits_what_follows_from_the_sight(sampled, mode):
+    """Four Euler steps of the exact velocity bring 84 % of these paths within 0.15 of a way."""
+    seen, first, second = sampled[mode]
     assert 0.35 < (first > 0).mean() < 0.65
-    assert (np.abs(np.abs(first) - 0.6) < 0.15).mean() > 0.25
-    assert np.abs(second - 0.5 * np.asarray(seen)[:, 0]).mean() < 0.07
+    assert (np.abs(np.abs(first) - 0.6) < 0.15).mean() > 0.60
+    assert np.abs(second - 0.5 * seen).mean() < 0.05
 
 
-def test_acting_it_takes_both_ways_shown_and_hits_what_follows_from_the_sight(cloned):
-    actor, moments = cloned
-    seen = jnp.full((ASKED, 1), 0.8)
-    check(actor.infer(moments, seen, noise()).actions, seen)
-
-
-def test_learning_it_does_the_same(cloned):
-    actor, moments = cloned
-    seen = jnp.linspace(-1, 1, ASKED)[:, None]
-    check(actor.train(moments, seen, noise())[0].actions, seen)
+def test_its_gate_stays_as_open_as_it_was(cloned):
+    gate = cloned[0].field.gate
+    np.testing.assert_array_equal(gate.kernel, 0.0)
+    np.testing.assert_array_equal(gate.bias, OPEN_GATE_BIAS)
 
 
 def test_the_step_noise_is_the_recipes(cloned):
