@@ -27,8 +27,9 @@ LEARNER = {
     "policy_delay": 2,
     "discount": 0.97,
 }
-FLOW_LEARNER = {"critic": "polyak"}
-"""Of a method whose actor is a flow; the others have no such critic."""
+FLOW_LEARNER = {"critic": "polyak", "imitation": 1.0}
+"""Of a method whose actor is a flow. Without imitation critics that have seen little but demonstrations lead
+the actor away from them within 500 updates, and it does not come back (docs/robot_learning.md)."""
 
 
 def settings(task: str, preset: str, actions: int | None = None, updates_per_action: int = 4) -> Settings:

@@ -22,7 +22,7 @@ from hcpg.loops.streams import Stream, key
 from hcpg.networks.batch_renorm import WARMUP_CALLS, Moments
 from hcpg.networks.descent import descend
 from hcpg.networks.flow import FlowActor, Noise
-from hcpg.networks.matching import bridge, end_points, matching_loss
+from hcpg.networks.matching import DEVIATION, bridge, end_points, matching_loss
 from hcpg.presets import Settings
 from hcpg.report.durable import replace_json
 from hcpg.types import Batch
@@ -47,7 +47,7 @@ class Recipe:
     batch_size: int = 128
     learning_rate: float = 3e-3
     """At the start; it falls to nothing along a cosine."""
-    deviation: float = 0.1
+    deviation: float = DEVIATION
     """Of the noise of every flow step, before tanh."""
     critic_updates: int = 2000
     """Of the critics alone, on the demonstrations."""

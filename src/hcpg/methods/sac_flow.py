@@ -14,6 +14,7 @@ from hcpg.networks.decoder_actor import DecoderActor
 from hcpg.networks.descent import count_update, descend, rest
 from hcpg.networks.flow import FlowActor, Noise
 from hcpg.networks.gated_actor import GatedActor
+from hcpg.networks.matching import DEVIATION, bridge, end_points, matching_loss
 from hcpg.networks.maximum_entropy import (
     improve_critics,
     improve_temperature,
@@ -62,6 +63,8 @@ class Config:
     """Weight of the entropy at the start."""
     target_entropy: float = 0.0
     """Entropy of the path (not of the action) that the temperature steers to, nats."""
+    imitation: float = 0.0
+    """Weight of flow matching to the batch's actions in the actor's loss; 0 where learning is from scratch."""
     target_rate: float = 0.005
     """Share of the online critics mixed into their targets at each update (polyak only)."""
 
@@ -199,9 +202,7 @@ class SACFlow:
         noise = Noise.draw(key, batch.actions.shape, self.config.flow_steps)
         nudges = jnp.zeros((self.config.flow_steps + 1, *batch.actions.shape))
         slopes = jax.value_and_grad(self._actor_loss, argnums=(0, 1), has_aux=True)
-        (loss, (entropy, moments)), (gradient, by_samples) = slopes(
-            state.actor, nudges, state, batch.observations, noise
-        )
+        (loss, (entropy, moments)), (gradient, by_samples) = slopes(state.actor, nudges, state, batch, noise)
         adam = self._adam(self.config.actor_learning_rate)
         actor, actor_optimizer = descend(adam, gradient, state.actor_optimizer, state.actor)
         surplus = entropy - self.config.target_entropy
@@ -225,13 +226,20 @@ class SACFlow:
         actor: FlowActor,
         nudges: Float[Array, "M1 B A"],
         state: State,
-        observations: Float[Array, "B O"],
+        batch: Batch,
         noise: Noise,
     ) -> tuple[Float[Array, ""], tuple[Float[Array, ""], PyTree]]:
-        path, moments = actor.train(state.actor_moments, observations, noise, nudges)
-        values = pessimistic_values(self.critics, state.critic, observations, path.actions)
+        path, moments = actor.train(state.actor_moments, batch.observations, noise, nudges)
+        values = pessimistic_values(self.critics, state.critic, batch.observations, path.actions)
         loss = (jnp.exp(state.log_temperature) * path.log_prob - values).mean()
+        if self.config.imitation > 0:
+            loss += self.config.imitation * self._strayed(actor, state.actor_moments, batch, noise)
         return loss, (-path.log_prob.mean(), moments)
+
+    def _strayed(self, actor: FlowActor, moments: PyTree, batch: Batch, noise: Noise) -> Float[Array, ""]:
+        """How far the flow is from one that gives the batch's actions: the loss of cloning."""
+        path = bridge(end_points(batch.actions), noise, DEVIATION)
+        return matching_loss(actor, moments, batch.observations, path, DEVIATION)[0]
 
     def _adam(self, learning_rate: float) -> optax.GradientTransformation:
         return optax.adam(learning_rate, b1=self.config.momentum)

@@ -16,6 +16,8 @@ from hcpg.networks.flow import FlowActor, Noise, Normalise, at_rest
 
 MARGIN = 0.02
 """Actions are moved this far inside their bounds, where the inverse of tanh is finite: at most 2.3."""
+DEVIATION = 0.1
+"""What the noise of every step is taught to be, before tanh: no demonstration determines it."""
 
 
 class Bridge(NamedTuple):
