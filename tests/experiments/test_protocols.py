@@ -66,8 +66,8 @@ def test_the_control_arms_are_in_a_table_of_each_suite():
         ("metaworld_paper", "metaworld/door-open", 1_000_000, 1, 50_000),
         ("maniskill_paper", "maniskill/pick-cube", 1_000_000, 32, 50_000),
         ("maniskill_paper", "maniskill/poke-cube", 1_000_000, 32, 50_000),
-        ("maniskill", "maniskill/pick-cube", 300_000, 8, 5_000),
-        ("maniskill", "maniskill/push-cube", 300_000, 8, 5_000),
+        ("maniskill", "maniskill/pick-cube", 100_000, 8, 5_000),
+        ("maniskill", "maniskill/push-cube", 100_000, 8, 5_000),
         ("controls", "metaworld/drawer-open", 60_000, 8, 5_000),
     ],
 )
