@@ -151,6 +151,7 @@ def test_list_names_what_there_is(capsys):
     assert described["qsm"] == "qsm alone"
     assert described["sac_flow_rlinf"] == "sac_flow alone, velocity decoder, critic polyak"
     assert any(line.startswith("  point/carry ") for line in lines)
+    assert any(line.startswith("  twin    The digital twin of a Franka arm") for line in lines)
 
 
 def test_plain_lines_where_nobody_watches(trained):

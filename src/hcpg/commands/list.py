@@ -10,7 +10,7 @@ from pathlib import Path
 from hcpg import presets, registry
 from hcpg.selection import RULES, Selector
 
-KINDS = ("methods", "selectors", "tasks", "presets", "budgets")
+KINDS = ("methods", "selectors", "tasks", "presets", "budgets", "robots")
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -30,6 +30,8 @@ def _lines(kind: str) -> dict[str, str]:
     """What each name stands for, in a line."""
     if kind == "methods":
         return {name: _summary(f"hcpg.methods.{name}") for name in registry.names("methods")}
+    if kind == "robots":
+        return {name: _summary(f"hcpg.robots.{name}") for name in registry.names("robots")}
     if kind == "selectors":
         return dict.fromkeys(RULES, "") | {"bare": "the method's own action, without a selector"}
     if kind == "tasks":
