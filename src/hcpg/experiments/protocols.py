@@ -21,9 +21,9 @@ CONTROLLED = tuple(f"metaworld/{name}" for name in ("drawer-open", "button-press
 BASELINES = ("sac", "flowrl", "qsm", "sac_flow")
 
 # As ManiSkill trains from states: 32 environments, one update for two steps; and the paper's 16 episodes per
-# evaluation. One length for all tasks of a table. On a CPU it was chosen before any run of a table, from single
-# runs (docs/maniskill.md): PushCube and PullCube are learned by then, PickCube and PokeCube begin to be; three
-# times as many would make the suite's tables 110 core-hours instead of 37.
+# evaluation. One length for all tasks of a table. On a CPU it was chosen before any run of a table, from
+# single runs (docs/maniskill.md): PushCube and PullCube are learned by then, PickCube and PokeCube begin to
+# be; three times as many would make the suite's tables 110 core-hours instead of 37.
 MANISKILL_CHANGES = {
     "paper": {"environments": 32, "updates_per_step": 0.5, "evaluation_episodes": 16},
     "cpu": {"steps": 100_000},
