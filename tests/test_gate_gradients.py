@@ -79,5 +79,5 @@ def test_the_stored_table_and_settings_are_those_of_the_stored_numbers_and_of_to
         now = asdict(gate_gradients.method(velocity, int(steps)).config)
         assert settings == {setting: now[setting] for setting in settings}
         # These came later; their defaults are what was measured.
-        assert now.keys() - settings.keys() <= {"plain_norm", "polyak_inputs"}
-        assert (now["plain_norm"], now["polyak_inputs"]) == ("shared", "standardised")
+        assert now.keys() - settings.keys() <= {"plain_norm", "polyak_inputs", "imitation"}
+        assert (now["plain_norm"], now["polyak_inputs"], now["imitation"]) == ("shared", "standardised", 0.0)
