@@ -27,7 +27,7 @@ def settings(preset="hcpg_flow"):
     full = arm_budgets.settings("point/reach", preset, BUDGET, PER_ACTION)
     sizes = {name: 8 for name in vars(full.learner) if name.endswith("hidden_size")}
     budget = replace(full.budget, batch_size=16)
-    return replace(full, learner=replace(full.learner, flow_steps=2, **sizes), budget=budget)
+    return replace(full, learner=replace(full.learner, flow_steps=2, imitation=0.0, **sizes), budget=budget)
 
 
 def shown(folder):

@@ -1,0 +1,103 @@
+"""Keep what `scripts/robot_study.sh` made, without what is large, and tabulate how each run learned.
+
+python scripts/robot_study_store.py STUDY FOLDER
+"""
+
+import argparse
+import gzip
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+LEARNED = ("config.json", "learning.json", "metrics.jsonl", "episodes.jsonl", "status.json")
+HEAD = (
+    "Task", "Run", "Actions", "Updates", "Learner, s", "Episodes", "Succeeded",
+    "Actor's spread, first", "last", "Selector's spread", "Weight entropy",
+)  # fmt: skip
+
+
+def store(study: Path, folder: Path) -> None:
+    """Copy manifests, facts, rows and ledgers, and the log of one trial per task."""
+    for manifest in study.glob("demos/*/manifest.json"):
+        _copy(manifest, folder / "demos" / f"{manifest.parent.name}.json")
+    for facts in study.glob("clone/*/**/cloning.json"):
+        _copy(facts, folder / "clones" / f"{_task(facts)}.json")
+    for metrics in study.glob("learn/*/**/metrics.jsonl"):
+        for name in LEARNED:
+            _copy(metrics.with_name(name), folder / "learning" / _task(metrics) / _preset(metrics) / name)
+    for plan in study.glob("trials/franka/*/plan.json"):
+        to = folder / "trials/franka" / plan.parent.name
+        for name in ("plan.json", "ledger.jsonl"):
+            _copy(plan.with_name(name), to / name)
+        if (shown := _shown(plan.parent)) is not None:
+            _copy(shown / "trial.json", to / shown.name / "trial.json")
+            packed = gzip.compress((shown / "steps.jsonl").read_bytes(), mtime=0)
+            (to / shown.name / "steps.jsonl.gz").write_bytes(packed)
+
+
+def _shown(trials: Path) -> Path | None:
+    """The first trial of HCPG-Flow that succeeded, else the first of any policy that did."""
+    rows = [json.loads(line) for line in (trials / "ledger.jsonl").read_text().splitlines()]
+    begun = {row["trial"]: row for row in rows if row["row"] == "begun"}
+    done = [row["trial"] for row in rows if row["row"] == "ended" and row["ended"] == "success"]
+    if not done:
+        return None
+    chosen = min(done, key=lambda number: (begun[number]["policy"] != "hcpg_flow", number))
+    return next(iter(sorted(trials.glob(f"trial_{chosen:03d}_*"))))
+
+
+def table(folder: Path) -> str:
+    """How each stored run learned, in Markdown."""
+    rows = [HEAD, tuple("---" for _ in HEAD)]
+    for path in sorted((folder / "learning").glob("*/*/metrics.jsonl")):
+        metrics = [json.loads(line) for line in path.read_text().splitlines()]
+        episodes = [json.loads(line) for line in path.with_name("episodes.jsonl").read_text().splitlines()]
+        last = metrics[-1]
+        rows.append((
+            path.parts[-3], path.parts[-2], str(last["step"]), str(last["updates"]), f"{last['wall_s']:.0f}",
+            str(len(episodes)), str(sum(each["success_once"] for each in episodes)),
+            f"{metrics[0]['actor_spread']:.2f}", f"{last['actor_spread']:.2f}",
+            _mean(metrics, "selector_spread"), _mean(metrics, "selector_weight_entropy"),
+        ))  # fmt: skip
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _mean(metrics: list[dict[str, Any]], name: str) -> str:
+    """Over the episodes; of a method that proposes once there is nothing to tell."""
+    found = [row[name] for row in metrics if row.get(name)]
+    return f"{np.mean(found):.2f}" if found else "-"
+
+
+def _task(path: Path) -> str:
+    """The part of `.../franka/TASK/PRESET/s0/ID/file` after the slash of the task's name."""
+    return path.parts[-5]
+
+
+def _preset(path: Path) -> str:
+    return path.parts[-4]
+
+
+def _copy(path: Path, to: Path) -> None:
+    to.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(path, to)
+
+
+def main() -> None:
+    """Store the study and write `learning.md`."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("study", type=Path)
+    parser.add_argument("folder", type=Path)
+    chosen = parser.parse_args()
+    store(chosen.study, chosen.folder)
+    text = table(chosen.folder)
+    (chosen.folder / "learning.md").write_text(text)
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
