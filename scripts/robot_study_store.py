@@ -7,6 +7,8 @@ import argparse
 import gzip
 import json
 import shutil
+from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,11 @@ HEAD = (
     "Task", "Run", "Actions", "Updates", "Learner, s", "Episodes", "Succeeded",
     "Actor's spread, first", "last", "Selector's spread", "Weight entropy",
 )  # fmt: skip
+TIMED = (
+    "Task", "Attempts", "Invalid", "Faults of the arm", "Seconds from one to the next, median", "Ticks",
+    "Deadlines missed", "Lateness p50, ms", "p99, ms", "max, ms",
+)  # fmt: skip
+"""Lateness p50 and p99 are medians over the attempts."""
 
 
 def store(study: Path, folder: Path) -> None:
@@ -65,6 +72,26 @@ def table(folder: Path) -> str:
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 
+def timing(folder: Path) -> str:
+    """What the stored trials took, and how late the loop was in them, in Markdown."""
+    rows = [TIMED, tuple("---" for _ in TIMED)]
+    for path in sorted((folder / "trials").glob("franka/*/ledger.jsonl")):
+        lines = [json.loads(line) for line in path.read_text().splitlines()]
+        begun = [datetime.fromisoformat(line["time"]) for line in lines if line["row"] == "begun"]
+        ended = [line for line in lines if line["row"] == "ended"]
+        gaps_s = [(after - before).total_seconds() for before, after in pairwise(begun)]
+        timings = [line["timing"] for line in ended if "timing" in line]
+        rows.append((
+            path.parts[-2], str(len(ended)), str(sum(bool(line["invalid"]) for line in ended)),
+            str(sum(line["ended"] == "fault" for line in ended)), f"{np.median(gaps_s):.0f}",
+            str(sum(each["ticks"] for each in timings)), str(sum(each["skipped"] for each in timings)),
+            f"{np.median([each['lateness_p50_ms'] for each in timings]):.2f}",
+            f"{np.median([each['lateness_p99_ms'] for each in timings]):.2f}",
+            f"{max(each['lateness_max_ms'] for each in timings):.1f}",
+        ))  # fmt: skip
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
 def _mean(metrics: list[dict[str, Any]], name: str) -> str:
     """Over the episodes; of a method that proposes once there is nothing to tell."""
     found = [row[name] for row in metrics if row.get(name)]
@@ -86,7 +113,7 @@ def _copy(path: Path, to: Path) -> None:
 
 
 def main() -> None:
-    """Store the study and write `learning.md`."""
+    """Store the study and write `learning.md` and `timing.md`."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -94,9 +121,9 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     chosen = parser.parse_args()
     store(chosen.study, chosen.folder)
-    text = table(chosen.folder)
-    (chosen.folder / "learning.md").write_text(text)
-    print(text)
+    for name, text in (("learning.md", table(chosen.folder)), ("timing.md", timing(chosen.folder))):
+        (chosen.folder / name).write_text(text)
+        print(text)
 
 
 if __name__ == "__main__":
