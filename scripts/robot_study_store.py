@@ -46,14 +46,15 @@ def store(study: Path, folder: Path) -> None:
 
 
 def _shown(trials: Path) -> Path | None:
-    """The first trial of HCPG-Flow that succeeded, else the first of any policy that did."""
+    """The first trial of HCPG-Flow that succeeded and counts, else the first of any policy."""
     rows = [json.loads(line) for line in (trials / "ledger.jsonl").read_text().splitlines()]
-    begun = {row["trial"]: row for row in rows if row["row"] == "begun"}
-    done = [row["trial"] for row in rows if row["row"] == "ended" and row["ended"] == "success"]
+    begun = {row["trial"]: row for row in rows if row["row"] == "begun" and row["attempt"] == 1}
+    counted = [row for row in rows if row["row"] == "ended" and row["attempt"] == 1 and not row["invalid"]]
+    done = [row["trial"] for row in counted if row["ended"] == "success"]
     if not done:
         return None
-    chosen = min(done, key=lambda number: (begun[number]["policy"] != "hcpg_flow", number))
-    return next(iter(sorted(trials.glob(f"trial_{chosen:03d}_*"))))
+    chosen = begun[min(done, key=lambda number: (begun[number]["policy"] != "hcpg_flow", number))]
+    return trials / f"trial_{chosen['trial']:03d}_{chosen['code']}"
 
 
 def table(folder: Path) -> str:

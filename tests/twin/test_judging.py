@@ -29,6 +29,11 @@ def test_a_button_is_pressed_from_10_mm_of_travel():
     assert not judge.look().done
     set_joint(physics, "button", 0.0100)
     assert judge.tick().done
+    set_joint(physics, "button", 0.0080)
+    up = judge.tick()
+    assert (up.done, up.was_done) == (False, True)
+    judge.restart()
+    assert not judge.tick().was_done
 
 
 def test_a_drawer_is_closed_below_8_mm_and_progress_counts_from_where_it_was():

@@ -26,10 +26,10 @@ class Truthful(Protocol):
 
 
 def referee_of(task: str, stage: Stage) -> Callable[[], bool] | None:
-    """What says from the physics whether the task `suite/name` is done; None where nothing knows.
+    """What says from the physics whether the task `suite/name` was done; None where nothing knows.
 
     A twin counts ticks of its own, which fall between those of the loop: where one tick is enough, what holds
-    at the moment of the question is.
+    at the moment of the question is. And what a served twin tells is up to 50 ms old.
     """
     if not isinstance(stage, Truthful):
         return None
@@ -37,7 +37,7 @@ def referee_of(task: str, stage: Stage) -> Callable[[], bool] | None:
 
     def done() -> bool:
         truth = stage.truth()
-        return truth.done or (at_once and truth.holds)
+        return truth.was_done or (at_once and truth.holds)
 
     return done
 

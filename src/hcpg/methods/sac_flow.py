@@ -64,7 +64,7 @@ class Config:
     target_entropy: float = 0.0
     """Entropy of the path (not of the action) that the temperature steers to, nats."""
     imitation: float = 0.0
-    """Weight of flow matching to the batch's actions in the actor's loss; 0 where learning is from scratch."""
+    """Weight of flow matching to the batch's actions in the actor's loss; 0 for learning from scratch."""
     target_rate: float = 0.005
     """Share of the online critics mixed into their targets at each update (polyak only)."""
 

@@ -43,6 +43,8 @@ class Truth(NamedTuple):
     """Whether the task's condition holds in this moment."""
     done: bool
     """Whether it has held for as long as the task asks."""
+    was_done: bool
+    """Whether that was so at any tick since the episode began: a button comes up again once the arm holds."""
 
 
 class Judge:
@@ -56,7 +58,7 @@ class Judge:
 
     def restart(self) -> None:
         """Begin an episode with things as they lie now; `first` is where the thing lies."""
-        self._held_for = 0
+        self._held_for, self._was_done = 0, False
         self.first = self._data.site_xpos[self._at.object].copy()
         self._opening_m = self._joint("drawer") if self._task == "drawer-closing" else 0.0
 
@@ -68,13 +70,15 @@ class Judge:
         tool = tip if self._task in WITH_THE_TIP else data.site_xpos[self._at.tcp]
         reach_m = 0.0 if progress > 0 else float(np.linalg.norm(thing - tool))
         done = self._held_for >= TICKS[self._task]
-        return Truth(thing, self._goal(), tip, reach_m, progress, holds, done)
+        return Truth(thing, self._goal(), tip, reach_m, progress, holds, done, self._was_done or done)
 
     def tick(self) -> Truth:
         """What is true now, one tick after the last."""
         holds = self.look().holds
         self._held_for = self._held_for + 1 if holds else 0
-        return self.look()
+        told = self.look()
+        self._was_done = told.was_done
+        return told
 
     def _goal(self) -> Float[np.ndarray, " 3"]:
         if self._task == "rugby-grasp":

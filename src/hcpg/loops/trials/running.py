@@ -23,9 +23,8 @@ from hcpg.robot_types import Sight, Snapshot
 
 MOST_BLIND = 0.1
 """A larger share of an episode's ticks without a fresh sighting, once there was one: the trial is invalid."""
-SETTLES_S, LOOKS = 0.3, 15
-"""From the last command to the referee's last look, and how many it has: what a served twin tells is up to
-50 ms old, and a button comes up again once the arm holds."""
+SETTLES_S = 0.3
+"""From the last command to the referee's last look."""
 Referee = Callable[[], bool]
 """Says from a simulation's physics whether the task is done now."""
 
@@ -92,9 +91,8 @@ def _tried(arena: Arena, ledger: Ledger, turn: Turn) -> SessionResult:
     if not stage.begun:
         return done
     clock = arena.rig.robot.clock
-    for _ in range(LOOKS):
-        clock.sleep_until(clock.now_s() + SETTLES_S / LOOKS)
-        seen.look()
+    clock.sleep_until(clock.now_s() + SETTLES_S)
+    seen.look()
     ledger.end(turn, _facts(arena, done, seen))
     if arena.operator.judges and not _invalid(arena, done):
         _judge(arena, ledger, turn)
