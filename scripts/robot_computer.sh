@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A robot's computer, as far as Python goes: an environment with NumPy, safetensors and this package without extras,
+# A robot's computer, as far as Python goes: an environment with this package and its extra `deploy` (NumPy, safetensors) alone,
 # in which an exported policy is loaded, timed at 30 Hz, and run through the control loop on the point arm.
 #
 #   scripts/robot_computer.sh FOLDER [SECONDS [ENVIRONMENT]]
@@ -15,7 +15,7 @@ environment="${3:-$place/venv}"
 
 if [[ ! -x "$environment/bin/hcpg" ]]; then
   python3 -m venv "$environment"
-  "$environment/bin/pip" install --quiet --disable-pip-version-check "safetensors>=0.8,<0.9" "$root"
+  "$environment/bin/pip" install --quiet --disable-pip-version-check "$root[deploy]"
 fi
 ln -s "$policy" "$place/policy"
 cd "$place"  # away from the checkout, so that nothing of it can be imported
