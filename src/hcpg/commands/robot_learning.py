@@ -17,7 +17,7 @@ from hcpg.commands.served_twin import add_serve, serving
 from hcpg.experiments import arm_budgets
 from hcpg.interfaces import Rig
 from hcpg.loops import demonstrations, recording
-from hcpg.loops.control import gamepad, keyboard
+from hcpg.loops.control import gamepad, keyboard, spacemouse
 from hcpg.loops.recording import Order, Source
 from hcpg.safety.clock import MachineClock
 
@@ -35,10 +35,12 @@ def add(actions: "argparse._SubParsersAction") -> None:
     add_serve(demos)
     demos.add_argument("--count", type=int, default=20, help="successful ones wanted; default: 20")
     demos.add_argument(
-        "--source", choices=("expert", "keyboard", "gamepad"), default="expert",
+        "--source", choices=("expert", "keyboard", "gamepad", "spacemouse"), default="expert",
         help="who shows it; expert (default) is a script with noise, where the robot has one",
     )  # fmt: skip
-    demos.add_argument("--device", type=Path, default=gamepad.DEVICE, help=f"default: {gamepad.DEVICE}")
+    demos.add_argument(
+        "--device", type=Path, default=gamepad.DEVICE, help=f"of the gamepad; default: {gamepad.DEVICE}"
+    )
     demos.add_argument("--seed", type=int, default=0, help="of start states and noise; default: 0")
     demos.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new folder")
     what = "make the initial policy, for every method alike: match the flow to demonstrations"
@@ -159,6 +161,9 @@ def _source(options: argparse.Namespace, order: Order, rig: Rig) -> Source:
     if options.source == "gamepad":
         sys.stdout.write(f"{gamepad.HELP}\n")
         return Source(gamepad.Gamepad(size, device=options.device), facts)
+    if options.source == "spacemouse":
+        sys.stdout.write(f"{spacemouse.HELP}\n")
+        return Source(spacemouse.SpaceMouse(size), facts)
     sys.stdout.write(f"{keyboard.HELP}\n")
     return Source(keyboard.Keyboard(sys.stdin.fileno(), MachineClock(), size), facts)
 
