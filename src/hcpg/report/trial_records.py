@@ -7,7 +7,7 @@ The folder of one task holds `plan.json`, `ledger.jsonl`, and a folder per attem
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -123,14 +123,21 @@ def attempts_of(rows: Sequence[Mapping[str, Any]]) -> list[Attempt]:
     return [_attempt(facts) for facts in found.values()]
 
 
+def _with_a_ledger(root: Path) -> Iterator[Path]:
+    for folder, inner, files in os.walk(root):
+        if "manifest.json" in files:
+            inner.clear()  # a run, whose checkpoints and videos hold no trials
+        if PLAN in files and LEDGER in files:
+            yield Path(folder)
+
+
 def find_studies(*roots: Path) -> list[Study]:
     """Every task's trials at or under the folders, by task.
 
     Raises:
         RecordError: one of them is damaged, or two are of one task.
     """
-    walks = [each for root in roots for each in os.walk(root)]
-    folders = [Path(folder) for folder, _, files in walks if PLAN in files and LEDGER in files]
+    folders = [folder for root in roots for folder in _with_a_ledger(root)]
     studies = [read_study(folder) for folder in folders if _is_plan(folder / PLAN)]
     names = [study.plan["task"] for study in studies]
     for name in names:
