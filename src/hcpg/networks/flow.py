@@ -73,7 +73,7 @@ class FlowActor(eqx.Module):
     ) -> tuple[Push, Any]:
         """What moves `sample` in step number `step`, and the moments after it."""
 
-    def cloning_part(self, gradient: "FlowActor") -> "FlowActor":
+    def cloning_part(self, gradient: PyTree) -> PyTree:
         """What cloning follows of a gradient: all of it, where no part keeps the others from learning."""
         return gradient
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 from jax import numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
 from hcpg.networks.dense import Dense
 from hcpg.networks.flow import FlowActor, Normalise, Push, step_times
@@ -63,7 +63,7 @@ class GatedActor(FlowActor):
             Deviation.create(of_deviation, *sizes, hidden_size),
         )
 
-    def cloning_part(self, gradient: "GatedActor") -> "GatedActor":
+    def cloning_part(self, gradient: PyTree) -> PyTree:
         """All but the gate's, which stays as open as it is: the candidate alone can give any velocity.
 
         Where actions come in two modes, the best constant velocity late in the path is none. A gate that
