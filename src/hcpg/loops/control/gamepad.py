@@ -24,6 +24,16 @@ _EVENT = struct.Struct("IhBB")
 _BUTTON, _AXIS, _FULL = 1, 2, 32767
 
 
+def pushed(
+    travel: Float[np.ndarray, " 3"], speed: float, grip: float, shape: tuple[int, int]
+) -> Float[np.ndarray, "K A"]:
+    """K times the action that sticks or a cap ask for, at a travel in [-1, 1]; none within the dead zone."""
+    action = np.zeros(shape)
+    action[:, :3] = speed * np.clip(np.where(np.abs(travel) > DEAD_ZONE, travel, 0.0), -1.0, 1.0)
+    action[:, 3:] = grip
+    return action
+
+
 class Gamepad:
     """Proposals from the sticks; used as a block, which closes the device."""
 
@@ -56,10 +66,7 @@ class Gamepad:
             DeviceError: the gamepad is gone.
         """
         self._read()
-        live = np.where(np.abs(self._sticks) > DEAD_ZONE, self._sticks, 0.0)
-        action = np.zeros(self._size)
-        action[:3], action[3:] = self._speed * live, self._grip
-        return np.tile(action, (count, 1))
+        return pushed(self._sticks, self._speed, self._grip, (count, self._size))
 
     def _read(self) -> None:
         while (events := self._waiting()) is not None:

@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from hcpg.loops.control.gamepad import pushed
 from hcpg.loops.control.keyboard import DeviceError
 from hcpg.types import Float
 
 HELP = "push the cap where the hand shall go; left button closes, right button opens; Ctrl-C stops"
 GRIPS = (-1.0, 1.0)
 """What the first two buttons ask for: close, open."""
-DEAD_ZONE = 0.1
-"""A cap that is let go rests anywhere within this part of its travel."""
 MOST_REPORTS = 64
 """Reports read at one tick: the device sends some eight in that time, so more are those of a stall."""
 
@@ -47,10 +46,7 @@ class SpaceMouse:
         cap = np.array([state.x, state.y, state.z])
         for pressed, grip in zip(state.buttons, GRIPS, strict=False):  # some have more buttons
             self._grip = grip if pressed else self._grip
-        action = np.zeros(self._size)
-        action[:3] = self._speed * np.clip(np.where(np.abs(cap) > DEAD_ZONE, cap, 0.0), -1.0, 1.0)
-        action[3:] = self._grip
-        return np.tile(action, (count, 1))
+        return pushed(cap, self._speed, self._grip, (count, self._size))
 
     def _newest(self) -> Any:
         """The state after every report that has arrived; one read takes in one report."""
