@@ -198,7 +198,7 @@ def _one(module: str) -> Any:
 
 PARTS = {
     part.__name__: part
-    for part in (gradient_steps, methods, pool, training, selection, memory, maniskill_stepping)
+    for part in (gradient_steps, methods, pool, training, selection, memory, maniskill_stepping, report)
 }
 
 

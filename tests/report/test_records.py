@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hcpg.report import reading
 from hcpg.report.records import RecordError, find_runs, load_run, load_runs
 from hcpg.report.rows import append_rows
 
@@ -103,3 +104,29 @@ def test_equal_settings_are_one_object_however_many_runs_have_them(tmp_path, wri
     first, second = load_runs([tmp_path])[0].runs
     assert first.config is second.config
     assert (first.name, first.config["budget"]) == ("p on point/reach s0", {"name": "cpu"})
+
+
+def test_several_processes_read_what_one_reads(tmp_path, caplog, monkeypatch, write_run):
+    for seed in range(6):
+        write_run(seed=seed, success=[seed, 5], bare=[0, 1], run_id=f"20260101T00000{seed}Z-a")
+    torn, bad = (load_runs([tmp_path])[0].runs[seed].path / "episodes.jsonl" for seed in (1, 4))
+    torn.write_bytes(torn.read_bytes() + b'{"step": 2')
+    bad.write_text("garbage\n")
+    alone = load_runs([tmp_path], skip_corrupt=True)
+    said = caplog.messages
+    caplog.clear()
+    monkeypatch.setattr(reading.os, "sched_getaffinity", lambda _: {0, 1})
+    monkeypatch.setattr(reading, "WORTH_A_PROCESS", 3)
+    monkeypatch.setattr(reading, "AT_ONCE", 2)
+    monkeypatch.setattr(reading, "measure", None)  # here, not in the processes
+    together = load_runs([tmp_path], skip_corrupt=True)
+    assert [run.seed for run in together[0].runs] == [0, 1, 2, 3, 5]
+    for one, other in zip(alone[0].runs, together[0].runs, strict=True):
+        assert one.path == other.path
+        np.testing.assert_equal(one.curves, other.curves)
+        np.testing.assert_equal(one.episodes, other.episodes)
+        assert other.config is together[0].runs[0].config  # what the page counts by identity
+    assert len(said) == 2
+    assert caplog.messages == said
+    with pytest.raises(RecordError, match=r"line 1 is not JSON: b'garbage'.* --skip-corrupt"):
+        load_runs([tmp_path])

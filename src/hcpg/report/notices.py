@@ -5,22 +5,35 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 
-class _Keeping(logging.StreamHandler):
+class _Keeping(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
-        self.kept: list[str] = []
+        self.notices: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        self.kept.append(record.getMessage())
-        super().emit(record)
+        self.notices.append(record.getMessage())
 
 
 @contextmanager
 def noticed() -> Iterator[list[str]]:
     """The notices given inside the block, as they come; each goes to the standard error, too."""
-    keeping, log = _Keeping(), logging.getLogger("hcpg.report")
-    log.addHandler(keeping)
+    with _handled(logging.StreamHandler()), kept() as notices:
+        yield notices
+
+
+@contextmanager
+def kept() -> Iterator[list[str]]:
+    """The notices given inside the block, as they come, for another process to give."""
+    keeping = _Keeping()
+    with _handled(keeping):
+        yield keeping.notices
+
+
+@contextmanager
+def _handled(handler: logging.Handler) -> Iterator[None]:
+    log = logging.getLogger("hcpg.report")
+    log.addHandler(handler)
     try:
-        yield keeping.kept
+        yield
     finally:
-        log.removeHandler(keeping)
+        log.removeHandler(handler)

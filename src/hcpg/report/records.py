@@ -10,35 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hcpg.report.episodes import Episodes, read_evaluations
-from hcpg.report.rows import RowError, last_row, read_rows
-from hcpg.types import Float, Int
+from hcpg.report.episodes import Episodes
+from hcpg.report.measured import BARE, Curve, Measured, RecordError, measure
+from hcpg.report.reading import measured_runs
+from hcpg.report.rows import RowError, read_rows
 
-BARE = "bare"
-"""The selector name under which a method's own action, without any selector, is recorded."""
 PARTS = ("manifest", "config", "status")
 """The JSON files of a run folder."""
 _LOG = logging.getLogger(__name__)
-
-
-class RecordError(ValueError):
-    """Rows that no honest number can be made of; the message says which and why."""
-
-
-class Curve(NamedTuple):
-    """The evaluations of one run with one selector, in the order of training."""
-
-    steps: Int[np.ndarray, " T"]
-    """Environment steps of training when evaluated."""
-    successes: Int[np.ndarray, "*seeds T"]
-    """Episodes with `success_once`."""
-    episodes: Int[np.ndarray, "*seeds T"]
-    """Episodes evaluated."""
-
-    @property
-    def rates(self) -> Float[np.ndarray, "*seeds T"]:
-        """Success rates in [0, 1]."""
-        return self.successes / self.episodes
 
 
 class Record(NamedTuple):
@@ -155,9 +134,11 @@ def load_runs(roots: Iterable[Path], skip_corrupt: bool = False) -> list[Group]:
 
 
 def _readable(paths: Iterable[Path], skip_corrupt: bool) -> Iterator[Record]:
-    for path in paths:
+    for path, measured in measured_runs(paths):
         try:
-            yield load_run(path)
+            if isinstance(measured, Exception):
+                raise measured
+            yield load_run(path, measured)
         except (RecordError, RowError) as error:
             if not skip_corrupt:
                 raise RecordError(f"{error} Or leave the run out with --skip-corrupt.") from error
@@ -184,8 +165,10 @@ def json_object(path: Path) -> dict[str, Any]:
 _parsed = lru_cache(maxsize=256)(json.loads)
 
 
-def load_run(path: Path) -> Record:
+def load_run(path: Path, measured: Measured | None = None) -> Record:
     """One run folder; its curves are empty before the first evaluation.
+
+    What was measured is read here unless it is given.
 
     Raises:
         RecordError: an evaluation counts a start state twice, or mixes adapters; or one of the folder's JSON
@@ -196,36 +179,18 @@ def load_run(path: Path) -> Record:
     address = manifest.get("run")
     if not isinstance(address, dict) or not {"task", "preset", "seed"} <= address.keys():
         raise RecordError(f"{path / 'manifest.json'} does not say task, preset and seed. Restore it.")
-    evaluations = read_evaluations(path / "episodes.jsonl")
-    if len(evaluations.adapters) > 1:
-        raise RecordError(
-            f"{path}: evaluations mix the adapters {', '.join(sorted(evaluations.adapters))}; "
-            "report one of them."
-        )
-    metrics = last_row(path / "metrics.jsonl")
+    shown = measured or measure(path)
     return Record(
         path=path,
         task=address["task"],
         preset=address["preset"],
         seed=address["seed"],
-        adapter=next(iter(evaluations.adapters), ""),
-        selector=next((name for name in evaluations.by_selector if name != BARE), BARE),
-        curves={name: _curve(path, name, each) for name, each in evaluations.by_selector.items()},
-        episodes=evaluations.by_selector,
+        adapter=shown.adapter,
+        selector=next((name for name in shown.episodes if name != BARE), BARE),
+        curves=shown.curves,
+        episodes=shown.episodes,
         config=config,
         manifest={key: _parsed(json.dumps(part)) for key, part in manifest.items()},
         status=status,
-        wall_s=float("nan") if metrics is None else float(metrics.get("wall_s") or "nan"),
+        wall_s=shown.wall_s,
     )
-
-
-def _curve(path: Path, selector: str, rows: Episodes) -> Curve:
-    again = (np.diff(rows.steps) == 0) & (np.diff(rows.starts) == 0)
-    if again.any():
-        place = int(np.argmax(again))
-        raise RecordError(
-            f"{path}: the evaluation at step {rows.steps[place]} with selector {selector} counts start "
-            f"state {rows.starts[place]} twice. Rewind the run to its checkpoint before evaluating again."
-        )
-    steps, begins, episodes = np.unique(rows.steps, return_index=True, return_counts=True)
-    return Curve(steps, np.add.reduceat(rows.successes.astype(np.int64), begins), episodes)
