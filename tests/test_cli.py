@@ -138,6 +138,13 @@ def test_an_unknown_error_keeps_its_traceback(monkeypatch):
         cli.main(["list"])
 
 
+def test_a_reader_that_leaves_early_is_no_error():
+    with subprocess.Popen([*COMMAND, "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        run.stdout.close()
+        assert run.stderr.read() == b""
+    assert run.returncode == 141
+
+
 def test_list_names_what_there_is(capsys):
     assert cli.main(["list"]) == 0
     lines = capsys.readouterr().out.splitlines()

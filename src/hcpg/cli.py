@@ -6,6 +6,7 @@ Nothing heavy is imported before a subcommand runs, so that `--help` answers at 
 import argparse
 import difflib
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 
@@ -30,8 +31,11 @@ EXIT_CODES = """exit codes:
   2    the command cannot be carried out as given; the message says why
   3    a run diverged, the others finished
   130  stopped by Ctrl-C; every run saved its state (hcpg train --resume RUN goes on)
+  141  whoever read what it prints has gone (hcpg list | head)
   143  stopped by SIGTERM, likewise
 """
+READER_GONE = 141
+"""What a shell reports of a process that SIGPIPE ended."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,7 +52,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"no command is named {name!r}.{guess} Known: {', '.join(COMMANDS)}.")
     command = importlib.import_module(f"hcpg.commands.{name}")
     try:
-        return command.run(given[1:])
+        code = command.run(given[1:])
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        # Python flushes once more when it ends, and would complain then.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return READER_GONE
     except Exception as error:
         # An error class of our own carries a message for the user; anything else is a bug and shows where.
         if not type(error).__module__.startswith("hcpg."):
