@@ -6,20 +6,17 @@ What is written is small enough for the repository, and free of this machine's p
 """
 
 import argparse
-import gzip
 import json
-import shutil
 from pathlib import Path
 
 from hcpg import presets
+from hcpg.experiments.storing import store
 from hcpg.report.figures import CAPTION, learning_curves
 from hcpg.report.pictures import save
 from hcpg.report.provenance import provenance
 from hcpg.report.records import BARE, Group, Record, find_runs, load_run, load_runs
 from hcpg.report.tables import aligned, markdown
 
-PACKAGES = ("python", "jax", "jaxlib", "equinox", "optax", "numpy", "mujoco", "metaworld")
-TABLES = ("episodes.jsonl", "metrics.jsonl")
 EACH_RUN = """# Runs, each by itself
 
 Each row is `hcpg train --task TASK --preset PRESET --seeds SEED` with the options given, which are those
@@ -46,7 +43,7 @@ def store_groups(folder: Path, roots: list[Path]) -> None:
     for run in (run for group in groups for run in group.runs):
         several = len({group.task for group in groups}) > 1
         store(
-            run,
+            run.path,
             folder / "runs" / (run.task.replace("/", "-") if several else "") / run.preset / f"s{run.seed}",
         )
     # Of what is stored: the commands of the runs hold paths, README.md has them without.
@@ -94,7 +91,7 @@ def store_each(folder: Path, roots: list[Path]) -> None:
     heading = ["task", "preset", "options", "seed", "with the selector", "bare"]
     (folder / "README.md").write_text(f"{EACH_RUN}\n{aligned([heading, *rows])}\n")
     for run in runs:
-        store(run, folder / "runs" / run.path.name)
+        store(run.path, folder / "runs" / run.path.name)
 
 
 def curves(run: Record) -> list[str]:
@@ -103,21 +100,6 @@ def curves(run: Record) -> list[str]:
         " ".join(f"{100 * rate:.0f}" for rate in run.curves[name].rates) if name in run.curves else "-"
         for name in (run.selector, BARE)
     ]
-
-
-def store(run: Record, folder: Path) -> None:
-    """One run's settings, provenance and rows."""
-    folder.mkdir(parents=True)
-    for name in ("config.json", "status.json"):
-        shutil.copy(run.path / name, folder)
-    manifest = json.loads((run.path / "manifest.json").read_text())
-    manifest["versions"] = {name: manifest["versions"].get(name) for name in PACKAGES}
-    for private in ("command", "platform"):  # the first holds paths; README.md has the command
-        del manifest[private]
-    (folder / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
-    for table in TABLES:
-        packed = gzip.compress((run.path / table).read_bytes(), mtime=0)
-        (folder / f"{table}.gz").write_bytes(packed)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,55 @@
+"""Runs kept small enough for a repository: settings, provenance and rows, and no path of the machine."""
+
+import gzip
+import json
+import shlex
+import shutil
+from pathlib import Path
+
+from hcpg import presets
+from hcpg.experiments.ledger import DONE
+from hcpg.loops.runs import RunFolder
+from hcpg.report.records import find_runs
+
+PACKAGES = ("python", "jax", "jaxlib", "equinox", "optax", "numpy", "mujoco", "metaworld", "mani_skill")
+"""Those whose versions a stored manifest keeps."""
+COPIED, PACKED = ("config.json", "status.json"), ("episodes.jsonl", "metrics.jsonl")
+
+
+def store(run: Path, folder: Path) -> None:
+    """Write the stored form of the run into a folder that does not exist yet; reports read it like a run."""
+    folder.mkdir(parents=True)
+    for name in COPIED:
+        shutil.copy(run / name, folder)
+    manifest = json.loads((run / "manifest.json").read_text())
+    versions = manifest["versions"]
+    manifest["versions"] = {name: versions[name] for name in PACKAGES if name in versions}
+    manifest["command"] = shlex.join(command(run))
+    del manifest["platform"]
+    (folder / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
+    for name in PACKED:
+        (folder / f"{name}.gz").write_bytes(gzip.compress((run / name).read_bytes(), mtime=0))
+
+
+def command(run: Path) -> list[str]:
+    """What makes the run again from anywhere, under the presets of today."""
+    folder = RunFolder(run)
+    settings, seed = presets.from_json(folder.config()), folder.manifest()["run"]["seed"]
+    named = ["--task", settings.task, "--preset", settings.preset, "--budget", settings.budget.name]
+    return ["hcpg", "train", *named, *presets.differences(settings), "--seeds", str(seed)]
+
+
+def store_all(results: Path, kept: Path) -> list[Path]:
+    """Store every finished or diverged run under `results` that `kept` lacks; gives the new folders."""
+    targets = {run: kept / run.relative_to(results) for run in find_runs(results)}
+    new = {
+        run: target
+        for run, target in targets.items()
+        if not target.exists() and RunFolder(run).status()["state"] in DONE
+    }
+    for run, target in new.items():
+        arriving = target.with_name(f".arriving-{target.name}")  # a name that no reader looks at
+        shutil.rmtree(arriving, ignore_errors=True)
+        store(run, arriving)
+        arriving.rename(target)
+    return list(new.values())
