@@ -2,8 +2,9 @@
 # ARGS passes options on: make demo ARGS="--seeds 0 1 2", make test ARGS="tests/selection -x".
 ROOT := $(shell cd "$$(dirname "$(strip $(MAKEFILE_LIST))")" && pwd)
 PYTHON_OF_PROJECT := .venv/bin/python
-# What a shell set up for another project (a ROS workspace, say) must not reach this one's packages.
-unexport PYTHONPATH PYTHONHOME
+# What a shell set up for another project (a ROS workspace, say) must not reach this one's packages. Containers
+# often forbid Python to keep its bytecode: each of the many processes here would compile every source anew.
+unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 # Two test processes share two cores: one thread each for NumPy, which pytest plug-ins load; the rest is in tests/conftest.py.
 TEST_SETTINGS := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
@@ -25,7 +26,7 @@ twin: install ## Make the environment of the served twin, .venv-twin, and add th
 test: ## Run the tests
 	@"$(ROOT)/scripts/install_system_packages.sh" sapien opengl vulkan browser
 	@"$(ROOT)/scripts/install.sh" run test
-	@cd "$(ROOT)" && $(TEST_SETTINGS) $(PYTHON_OF_PROJECT) -m pytest -n 2 --dist loadfile $(ARGS)
+	@cd "$(ROOT)" && $(TEST_SETTINGS) $(PYTHON_OF_PROJECT) -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 bench: ## Measure the speed against the peers, on this machine
 	@"$(ROOT)/scripts/install.sh" run bench

@@ -1,7 +1,7 @@
 """Probe problems whose value is known on paper, one difficulty each; fed to `update` as endless batches."""
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import jax
 from jax import numpy as jnp
@@ -58,12 +58,24 @@ def values(method, state):
     keys = jax.random.split(jax.random.key(1), 2)
     observations = jax.random.normal(keys[0], (20, 2))
     actions = jax.random.uniform(keys[1], (50, 1), minval=-1, maxval=1)
-    return jax.jit(jax.vmap(method.value, in_axes=(None, 0, None)))(state, observations, actions)
+    return valuer(method)(state, observations, actions)
+
+
+@cache
+def valuer(method):
+    """One compiled program for all probes."""
+    return jax.jit(jax.vmap(method.value, in_axes=(None, 0, None)))
 
 
 def proposals(method, state):
     """[20, 50, 1]: 50 proposals at each of 20 random observations."""
     keys = jax.random.split(jax.random.key(2), 20)
     observations = jax.random.normal(jax.random.key(3), (20, 2))
-    propose = jax.vmap(lambda observation, key: method.propose(state, observation, key, 50))
-    return jax.jit(propose)(observations, keys)
+    return proposer(method)(state, observations, keys)
+
+
+@cache
+def proposer(method):
+    """One compiled program for all probes."""
+    of_one = partial(method.propose, count=50)
+    return jax.jit(jax.vmap(of_one, in_axes=(None, 0, 0)))
