@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
-# One step of the study of docs/evidence/robot_trials_served, for one task:
+# One step of the study of docs/evidence/robot_study_served, for one task:
 #
 #     scripts/robot_study.sh demos|clone|learn|trials TASK OUT [ADDRESS]
 #
-# Demonstrations and trials are on the served twin. Learning is on the fast one, the same scene in the process:
-# what takes its time there is the updates, while a served twin would hold still beside them in real time.
-# What is finished is not run again, and what was cut off is taken up, so the same call goes on after a stop.
+# All of it is on the served twin, in real time: leave it both cores. What is finished is not run again, and
+# what was cut off is taken up, so the same call goes on after a stop.
 set -euo pipefail
 
 step=$1 task=$2 out=$3 address=${4:-127.0.0.1}
@@ -34,10 +33,10 @@ learn)
     for preset in hcpg_flow sac_flow; do
         run=$(made "$out/learn/$task/$preset")
         if [ -z "$run" ]; then
-            $hcpg robot learn "franka/$task" --robot twin --initial "$(made "$clones")" --demos "$demos" \
+            $hcpg robot learn "franka/$task" "${twin[@]}" --initial "$(made "$clones")" --demos "$demos" \
                 --preset $preset --seed 0 --out "$out/learn/$task/$preset"
         elif [ "$(state "$run")" != finished ]; then
-            $hcpg robot learn "franka/$task" --robot twin --resume "$run"
+            $hcpg robot learn "franka/$task" "${twin[@]}" --resume "$run"
         fi
     done
     ;;
