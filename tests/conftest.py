@@ -19,7 +19,8 @@ _CACHE = Path(__file__).parents[1] / ".cache"
 _QUICKLY_COMPILED = (
     "--xla_cpu_multi_thread_eigen=false "
     "--xla_cpu_use_fusion_emitters=false "
-    "--xla_backend_optimization_level=1"
+    "--xla_backend_optimization_level=1 "
+    "--xla_cpu_parallel_codegen_split_count=1"
 )
 
 os.environ.setdefault("JAX_PLATFORMS", "cpu")

@@ -1,6 +1,7 @@
 """What is exported acts without JAX as it acted with it."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import jax
@@ -9,8 +10,10 @@ import pytest
 from exported_runs import SPEC, TASK, a_run
 from jax import numpy as jnp
 
+from hcpg.loops import checkpoints
 from hcpg.loops.control.deployed import Policy, PolicyFolderError
 from hcpg.loops.exporting import ExportError, export
+from hcpg.loops.runs import RunFolder
 from hcpg.loops.runs_axis import take
 from hcpg.networks.flow import Noise
 from hcpg.selection import Selector
@@ -125,6 +128,20 @@ def test_an_older_checkpoint_has_the_evaluation_before_it(small, tmp_path):
     finally:
         (small.folder.checkpoints / "step_000000300").rename(small.folder.checkpoints / "step_000000480")
     assert [(each["step"], each["successes"]) for each in exported.policy.facts["evaluations"]] == [(240, 1)]
+
+
+def test_a_run_of_an_arm_keeps_no_observations_and_is_exported_all_the_same(small, tmp_path):
+    """Neither does a clone: the probe is then the task's first observation."""
+    [whole] = small.folder.checkpoints.glob("step_*")
+    _, facts = checkpoints.load(whole, {})
+    own = RunFolder(tmp_path / "run")
+    shutil.copytree(small.folder.path, own.path, ignore=shutil.ignore_patterns("checkpoints", "exports"))
+    checkpoints.save(own.checkpoints, small.step, {"state": take(small.states, 0)}, facts)
+    (own.path / "episodes.jsonl").unlink()
+    exported = export(small._replace(folder=own), tmp_path / "policy")
+    assert exported.policy.facts["evaluations"] == []
+    card = (exported.folder / "README.md").read_text()
+    assert "None was made up to this step" in card
 
 
 def test_nothing_is_written_over(small, tmp_path):

@@ -132,6 +132,15 @@ def load(path: Path, templates: Mapping[str, PyTree]) -> tuple[dict[str, PyTree]
     return trees, document["facts"]
 
 
+def trees(path: Path) -> frozenset[str]:
+    """The names of the trees that the checkpoint holds.
+
+    Raises:
+        CheckpointError: its facts are missing or altered.
+    """
+    return frozenset(_checked(path, [])["files"])
+
+
 def load_raw(path: Path, name: str) -> dict[str, np.ndarray]:
     """The arrays of one tree by key path, whatever their shapes (a replay saved only as far as filled).
 

@@ -1,6 +1,7 @@
 """A trained run written out for a robot's computer, where no JAX is: numbers, facts, model card."""
 
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 from jax.tree_util import keystr, tree_leaves_with_path
 
 import hcpg
+from hcpg import registry
 from hcpg.interfaces import Method
 from hcpg.loops import checkpoints
 from hcpg.loops.control.deployed import Policy
@@ -103,12 +105,21 @@ def _named(prefix: str, tree: Any) -> dict[str, np.ndarray]:
 
 
 def _probe(trained: Trained, state: Any) -> dict[str, np.ndarray]:
-    """What the network does on an observation of its training, and with which noise."""
-    path = trained.folder.checkpoints / f"step_{trained.step:09d}"
-    (observations,) = checkpoints.load_raw(path, "observations").values()
-    observation = np.asarray(observations[0], np.float32)
+    """What the network does on an observation of its task, and with which noise."""
+    observation = _observation(trained)
     noise, actions = sampled(trained.method, state, jax.numpy.asarray(observation), PROBES)
     return {"probe.observation": observation, "probe.noise": noise, "probe.actions": actions}
+
+
+def _observation(trained: Trained) -> np.ndarray:
+    """One of the run's training; for a clone or a run on an arm, which keep none, the task's first one."""
+    path = trained.folder.checkpoints / f"step_{trained.step:09d}"
+    if "observations" in checkpoints.trees(path):
+        (observations,) = checkpoints.load_raw(path, "observations").values()
+        return np.asarray(observations[0], np.float32)
+    task = registry.task(trained.settings.task)
+    with closing(registry.suite(task.suite).make(task, seed=trained.seed)) as environment:
+        return np.asarray(environment.reset(0), np.float32)
 
 
 def sampled(
