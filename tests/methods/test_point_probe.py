@@ -23,7 +23,7 @@ LEARNERS = {
     "qsm": (qsm, {**SIZES, **RATES, "gradient_scale": 5.0}),
     "sac_flow": (
         sac_flow,
-        {**SIZES, **RATES, "actor_learning_rate": 1e-3, "initial_temperature": 1e-6, "policy_delay": 1},
+        {**SIZES, **RATES, "actor_learning_rate": 2e-3, "initial_temperature": 1e-6, "policy_delay": 1},
     ),
 }
 
