@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-LEARNED = ("config.json", "learning.json", "metrics.jsonl", "episodes.jsonl", "status.json")
+LEARNED = ("config.json", "metrics.jsonl", "episodes.jsonl", "status.json")
 HEAD = (
     "Task", "Run", "Actions", "Updates", "Learner, s", "Episodes", "Succeeded",
     "Actor's spread, first", "last", "Selector's spread", "Weight entropy",
@@ -33,8 +33,10 @@ def store(study: Path, folder: Path) -> None:
     for facts in study.glob("clone/*/**/cloning.json"):
         _copy(facts, folder / "clones" / f"{_task(facts)}.json")
     for metrics in study.glob("learn/*/**/metrics.jsonl"):
+        to = folder / "learning" / _task(metrics) / _preset(metrics)
         for name in LEARNED:
-            _copy(metrics.with_name(name), folder / "learning" / _task(metrics) / _preset(metrics) / name)
+            _copy(metrics.with_name(name), to / name)
+        _copy_beginning(metrics.with_name("learning.json"), to)
     for plan in study.glob("trials/franka/*/plan.json"):
         to = folder / "trials/franka" / plan.parent.name
         for name in ("plan.json", "ledger.jsonl"):
@@ -106,6 +108,15 @@ def _task(path: Path) -> str:
 
 def _preset(path: Path) -> str:
     return path.parts[-4]
+
+
+def _copy_beginning(path: Path, to: Path) -> None:
+    """Where a run began; its clone and demonstrations are named within the study, wherever that lay."""
+    facts = json.loads(path.read_text())
+    for name, kind in (("initial", "clone"), ("demonstrations", "demos")):
+        parts = Path(facts[name]["path"]).parts
+        facts[name]["path"] = str(Path("study", *parts[parts.index(kind) :]))
+    (to / path.name).write_text(json.dumps(facts, indent=2) + "\n")
 
 
 def _copy(path: Path, to: Path) -> None:

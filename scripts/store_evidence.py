@@ -6,11 +6,9 @@ What is written is small enough for the repository, and free of this machine's p
 """
 
 import argparse
-import json
 from pathlib import Path
 
-from hcpg import presets
-from hcpg.experiments.storing import store
+from hcpg.experiments.storing import options, store
 from hcpg.report.figures import CAPTION, learning_curves
 from hcpg.report.pictures import save
 from hcpg.report.provenance import provenance
@@ -60,7 +58,7 @@ def commands(groups: list[Group]) -> str:
     """
     lines = ["# Evidence", "", "```sh"]
     for group in groups:
-        distinct = {" ".join(settings_of(run)) for run in group.runs}
+        distinct = {" ".join(options(run.path)) for run in group.runs}
         if len(distinct) > 1:
             raise SystemExit(f"{group.preset} on {group.task}: its seeds have different settings: {distinct}")
         seeds = " ".join(str(run.seed) for run in group.runs)
@@ -70,23 +68,12 @@ def commands(groups: list[Group]) -> str:
     return "\n".join([*lines, "```", ""])
 
 
-def settings_of(run: Record) -> list[str]:
-    """Budget, steps, and whatever else is not as the preset has it."""
-    settings = presets.from_json(json.loads((run.path / "config.json").read_text()))
-    budget = ["--budget", settings.budget.name, "--steps", str(settings.budget.steps)]
-    others = presets.differences(settings)
-    if "--budget.steps" in others:
-        place = others.index("--budget.steps")
-        del others[place : place + 2]
-    return budget + others
-
-
 def store_each(folder: Path, roots: list[Path]) -> None:
     """Every run that was evaluated at least once, by itself."""
     runs = [load_run(path) for root in roots for path in find_runs(root)]
     runs = [run for run in runs if run.curves]
     rows = sorted(
-        [run.task, run.preset, " ".join(settings_of(run)), str(run.seed), *curves(run)] for run in runs
+        [run.task, run.preset, " ".join(options(run.path)), str(run.seed), *curves(run)] for run in runs
     )
     heading = ["task", "preset", "options", "seed", "with the selector", "bare"]
     (folder / "README.md").write_text(f"{EACH_RUN}\n{aligned([heading, *rows])}\n")

@@ -1,5 +1,7 @@
 """The figures in the repository: every stored table is what the stored rows say, and names its command."""
 
+import gzip
+import re
 from pathlib import Path
 
 import pytest
@@ -25,3 +27,13 @@ def test_a_stored_table_follows_from_the_stored_rows(folder):
 
 def test_there_is_evidence():
     assert STORED
+
+
+def test_nothing_stored_names_a_place_of_the_machine_that_made_it():
+    folders, kinds = (EVIDENCE, EVIDENCE.parents[1] / "results"), {".json", ".jsonl", ".gz"}
+    files = [file for folder in folders for file in folder.rglob("*") if file.suffix in kinds]
+    assert len(files) > 500
+    for file in files:
+        content = gzip.decompress(file.read_bytes()) if file.suffix == ".gz" else file.read_bytes()
+        found = re.search(rb'["\s](/\w[\w.-]*/[^"\s]*)', content)
+        assert found is None, (file, found)

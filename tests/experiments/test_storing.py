@@ -6,7 +6,7 @@ from stand_in_jobs import create
 from tiny_cells import cell
 
 from hcpg.experiments import ledger
-from hcpg.experiments.storing import PACKAGES, store_all
+from hcpg.experiments.storing import store_all
 from hcpg.report.records import load_run
 
 EPISODE = {
@@ -56,12 +56,11 @@ def test_it_names_the_command_that_makes_it_again_and_no_place(tmp_path):
     [folder] = store_all(tmp_path / "out", tmp_path / "kept")
     manifest = json.loads((folder / "manifest.json").read_text())
     assert manifest["command"].startswith(
-        "hcpg train --task point/reach --preset sac --budget cpu --learner."
+        "hcpg train --task point/reach --preset sac --budget cpu --steps 64 --learner."
     )
-    assert " --budget.steps 64 " in manifest["command"]
+    assert "--budget.steps" not in manifest["command"]
     assert manifest["command"].endswith("--seeds 4")
     assert manifest["versions"] == {"jax": "1.0"}
-    assert "jax" in PACKAGES
     for file in folder.glob("*.json"):
         assert str(tmp_path) not in file.read_text()
         assert "mine" not in file.read_text()

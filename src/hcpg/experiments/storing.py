@@ -33,10 +33,20 @@ def store(run: Path, folder: Path) -> None:
 
 def command(run: Path) -> list[str]:
     """What makes the run again from anywhere, under the presets of today."""
-    folder = RunFolder(run)
-    settings, seed = presets.from_json(folder.config()), folder.manifest()["run"]["seed"]
-    named = ["--task", settings.task, "--preset", settings.preset, "--budget", settings.budget.name]
-    return ["hcpg", "train", *named, *presets.differences(settings), "--seeds", str(seed)]
+    address = RunFolder(run).manifest()["run"]
+    named = ["--task", address["task"], "--preset", address["preset"]]
+    return ["hcpg", "train", *named, *options(run), "--seeds", str(address["seed"])]
+
+
+def options(run: Path) -> list[str]:
+    """Budget, steps, and whatever else is not as the preset has it."""
+    settings = presets.from_json(RunFolder(run).config())
+    budget = ["--budget", settings.budget.name, "--steps", str(settings.budget.steps)]
+    others = presets.differences(settings)
+    if "--budget.steps" in others:
+        place = others.index("--budget.steps")
+        del others[place : place + 2]
+    return budget + others
 
 
 def store_all(results: Path, kept: Path) -> list[Path]:

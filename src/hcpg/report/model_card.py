@@ -98,7 +98,7 @@ def _other_adapter(facts: Mapping[str, Any]) -> str:
 
 def _evaluation_lines(evaluations: Sequence[Evaluation]) -> list[str]:
     if not evaluations:
-        return ["None was made up to this step. What an arm did with it, `hcpg robot trials` wrote down."]
+        return ["None was made up to this step. If an arm ran it, the trials' ledger says how it did."]
     head = ["| acting by | after step | successes | rate, 95 % interval |", "| --- | --- | --- | --- |"]
     return head + [
         f"| `{each.selector}` | {each.step:,} | {each.successes} of {each.episodes} | "
