@@ -117,8 +117,21 @@ def test_the_page_on_baselines_names_every_preset_and_one_short_run_of_each_is_s
 def test_overrides_name_real_settings_of_real_budgets():
     for preset in PRESETS.values():
         known = {each.name for each in fields(registry.method(preset.method).Config)}
-        assert set(preset.overrides) <= set(BUDGETS)
+        assert {name.partition("/")[0] for name in preset.overrides} <= set(BUDGETS)
+        assert {name.partition("/")[2] for name in preset.overrides} <= {"", *registry.names("suites")}
         assert all(set(changes) <= known for changes in (preset.learner, *preset.overrides.values()))
+
+
+def test_on_maniskill_sac_flow_keeps_its_published_entropy_at_both_budgets_and_elsewhere_at_the_papers():
+    def of(task, preset, budget):
+        learner = presets.settings(task, preset, budget).learner
+        return learner.target_entropy, learner.temperature_learning_rate
+
+    for preset in ("hcpg_flow", "sac_flow", "q_guided", "sac_flow_decoder"):
+        assert of("maniskill/push-cube", preset, "cpu") == (0.0, 1e-3)
+        assert of("maniskill/push-cube", preset, "paper") == (0.0, 1e-3)
+        assert of("metaworld/drawer-open", preset, "cpu") == (24.0, 3e-4)
+        assert of("metaworld/drawer-open", preset, "paper") == (0.0, 1e-3)
 
 
 def test_what_a_budget_asks_for_goes_before_what_the_preset_is():
