@@ -6,7 +6,7 @@ from stand_in_jobs import create
 from tiny_cells import cell
 
 from hcpg.experiments import ledger
-from hcpg.experiments.storing import store_all
+from hcpg.experiments.storing import store, store_all
 from hcpg.report.records import load_run
 
 EPISODE = {
@@ -49,6 +49,16 @@ def test_a_stored_run_counts_as_finished_and_gives_the_same_numbers(tmp_path):
     assert stored.curves["bare"].successes.tolist() == original.curves["bare"].successes.tolist() == [2]
     assert (stored.config, stored.wall_s) == (original.config, 2.0)
     assert store_all(tmp_path / "out", tmp_path / "kept") == []
+
+
+def test_a_stored_run_can_be_stored_anew(tmp_path):
+    whole = ended(cell(0), tmp_path / "out")
+    store(whole.path, tmp_path / "once")
+    store(tmp_path / "once", tmp_path / "twice")
+    files = sorted(path.name for path in (tmp_path / "once").iterdir())
+    assert files == sorted(path.name for path in (tmp_path / "twice").iterdir())
+    for name in files:
+        assert (tmp_path / "once" / name).read_bytes() == (tmp_path / "twice" / name).read_bytes()
 
 
 def test_it_names_the_command_that_makes_it_again_and_no_place(tmp_path):

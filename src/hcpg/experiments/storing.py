@@ -17,7 +17,10 @@ COPIED, PACKED = ("config.json", "status.json"), ("episodes.jsonl", "metrics.jso
 
 
 def store(run: Path, folder: Path) -> None:
-    """Write the stored form of the run into a folder that does not exist yet; reports read it like a run."""
+    """Write the stored form of the run into a folder that does not exist yet; reports read it like a run.
+
+    A stored run is stored anew, with the command that makes it under the presets of today.
+    """
     folder.mkdir(parents=True)
     for name in COPIED:
         shutil.copy(run / name, folder)
@@ -25,10 +28,12 @@ def store(run: Path, folder: Path) -> None:
     versions = manifest["versions"]
     manifest["versions"] = {name: versions[name] for name in PACKAGES if name in versions}
     manifest["command"] = shlex.join(command(run))
-    del manifest["platform"]
+    manifest.pop("platform", None)
     (folder / "manifest.json").write_text(json.dumps(manifest, indent=1) + "\n")
     for name in PACKED:
-        (folder / f"{name}.gz").write_bytes(gzip.compress((run / name).read_bytes(), mtime=0))
+        packed = run / f"{name}.gz"
+        rows = gzip.decompress(packed.read_bytes()) if packed.exists() else (run / name).read_bytes()
+        (folder / packed.name).write_bytes(gzip.compress(rows, mtime=0))
 
 
 def command(run: Path) -> list[str]:
