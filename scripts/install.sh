@@ -81,8 +81,8 @@ make_environment() {
     "$python" -m venv --clear .venv
 }
 
-pip_install() { # no bytecode yet: of two gigabytes of sources most are never imported
-    .venv/bin/python -m pip install --quiet --retries 2 --no-compile "$@" && return
+pip_install() {
+    .venv/bin/python -m pip install --quiet --retries 2 "$@" && return
     echo "The installation stopped; pip says why above. The first one needs the network; \
 run the same command again to go on." >&2
     exit 1
