@@ -66,7 +66,7 @@ def completion_figure(trials: Sequence[LoggedTrial]) -> "Figure":
             raise RecordError(f"{trial.title} did not end with the task done; choose one that did")
     pictures = [last_moment(trial) for trial in trials]
     width_in = PAGE_IN / max(len(trials), 4)
-    figure = blank(width_in * len(trials), width_in + 0.25)
+    figure = blank(width_in * len(trials), width_in + 0.35)
     for place, (trial, picture) in enumerate(zip(trials, pictures, strict=True)):
         axes = figure.add_subplot(1, len(trials), place + 1)
         axes.imshow(picture, interpolation="antialiased")
