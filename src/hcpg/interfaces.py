@@ -90,7 +90,7 @@ class Environment(Protocol):
         ...
 
     def render(self) -> UInt8[Tensor, "H W 3"]:
-        """The scene as an RGB picture."""
+        """The scene as an RGB picture; `RenderingError` where this machine cannot draw."""
         ...
 
     def close(self) -> None:

@@ -87,3 +87,7 @@ class Step(NamedTuple):
     terminated: bool
     success: bool
     """Whether the task's condition holds now."""
+
+
+class RenderingError(RuntimeError):
+    """No picture can be drawn on this machine; the message names what to install."""

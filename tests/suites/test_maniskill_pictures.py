@@ -11,8 +11,10 @@ from maniskill_rollouts import NAMES, rollout
 
 from hcpg import registry
 from hcpg.loops import doctor
+from hcpg.loops.pool import Pool
 from hcpg.suites.maniskill import control_mode, pictures
 from hcpg.suites.maniskill.building import build_stage
+from hcpg.types import RenderingError
 
 HERE = Path(__file__).parent
 NO_DRIVER = {"VK_DRIVER_FILES": "/nowhere", "VK_ICD_FILENAMES": "/nowhere"}
@@ -94,6 +96,18 @@ def test_what_cannot_be_drawn_is_told_with_its_cure(monkeypatch):
         raise RuntimeError("failed to find a rendering device")
 
     monkeypatch.setattr(pictures, "build_stage", refuse)
-    with pytest.raises(pictures.RenderingError, match="failed to find a rendering device") as stopped:
+    with pytest.raises(RenderingError, match="failed to find a rendering device") as stopped:
         pictures.Camera("PushCube-v1", "pd_ee_delta_pos")
     assert "Mesa 24 or newer" in str(stopped.value)
+
+
+def test_a_worker_that_cannot_draw_says_so_without_a_traceback(monkeypatch):
+    for name, value in NO_DRIVER.items():
+        monkeypatch.setenv(name, value)
+    with Pool("maniskill/push-cube", [0], workers=1) as pool:
+        pool.reset(np.array([0]))
+        with pytest.raises(RenderingError) as stopped:
+            pool.render(0)
+    assert str(stopped.value).startswith("cannot draw with Vulkan: ")
+    assert "scripts/install_system_packages.sh vulkan" in str(stopped.value)
+    assert len(str(stopped.value).splitlines()) == 1

@@ -12,6 +12,7 @@ from trajectories import actions_of, trajectory
 
 from hcpg import registry
 from hcpg.suites import metaworld as suite
+from hcpg.types import RenderingError
 
 ROOT = Path(__file__).parents[2]
 DRAWER = registry.task("metaworld/drawer-open")
@@ -83,7 +84,7 @@ def test_a_missing_library_stops_pictures_with_its_cure_and_nothing_else(monkeyp
     environment = suite.SUITE.make(DRAWER, seed=0)
     environment.reset(0)
     assert environment.step(np.zeros(4, np.float32)).reward >= 0.0
-    with pytest.raises(suite.RenderingError, match="libNoSuchLibrary") as stopped:
+    with pytest.raises(RenderingError, match="libNoSuchLibrary") as stopped:
         environment.render()
     assert "MUJOCO_GL=egl" in str(stopped.value)
     assert "scripts/install_system_packages.sh" in str(stopped.value)
@@ -94,6 +95,6 @@ def test_a_missing_library_stops_pictures_with_its_cure_and_nothing_else(monkeyp
 def test_the_users_own_choice_of_library_is_kept_and_checked_first(monkeypatch):
     monkeypatch.setitem(suite.OPENGL_LIBRARIES, "osmesa", "libNoSuchLibrary.so.1")
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
-    with pytest.raises(suite.RenderingError, match="MUJOCO_GL=osmesa"):
+    with pytest.raises(RenderingError, match="MUJOCO_GL=osmesa"):
         suite.SUITE.make(DRAWER, seed=0)
     assert os.environ["MUJOCO_GL"] == "osmesa"

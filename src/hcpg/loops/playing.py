@@ -56,7 +56,7 @@ def play(trained: Trained, episodes: int, file: Path | None = None, rerun: Path 
 
     Raises:
         PlayError: a recording of a run that acts without a selector.
-        WorkerError: the simulator cannot draw here; the message says what is missing.
+        RenderingError: this machine cannot draw; the message says what is missing.
         MissingExtraError: the video writer or rerun-sdk is not installed.
     """
     if rerun is not None and trained.name == BARE:

@@ -21,7 +21,7 @@ import numpy as np
 
 from hcpg import registry
 from hcpg.loops.worker import NOBODY, Board, Post, Sizes, board_bytes, board_in, serve
-from hcpg.types import Bool, Float, Int, Spec, Tensor, UInt8
+from hcpg.types import Bool, Float, Int, RenderingError, Spec, Tensor, UInt8
 
 GRACE_S = 5.0
 """How long `close` lets a worker finish its step before it is killed."""
@@ -77,6 +77,7 @@ class Pool:
         Raises:
             ValueError: no seeds, or less than one worker.
             WorkerError: an environment could not be built.
+            RenderingError: MUJOCO_GL names a library that this machine does not have.
         """
         if len(seeds) == 0 or workers < 1:
             raise ValueError(f"a pool needs at least one seed and one worker, got {len(seeds)} and {workers}")
@@ -165,7 +166,11 @@ class Pool:
         return self._board.observations.copy()
 
     def render(self, environment: int) -> UInt8[np.ndarray, "H W 3"]:
-        """A picture of one environment; not between `send` and `receive`."""
+        """A picture of one environment; not between `send` and `receive`.
+
+        Raises:
+            RenderingError: this machine cannot draw; nothing but `close` makes sense then.
+        """
         worker = next(w for w, share in enumerate(self._shares) if environment in share)
         self._tell(worker, "render", environment)
         return self._answer(worker, time.monotonic() + self.timeout_s)
@@ -217,6 +222,8 @@ class Pool:
             failure, result = connection.recv()
         except (EOFError, ConnectionResetError):
             self._report_death(worker)
+        if isinstance(failure, RenderingError):
+            raise failure
         if failure is not None:
             self._report(worker, f"raised an error:\n{failure}")
         return result

@@ -18,7 +18,7 @@ import numpy as np
 from hcpg import registry
 from hcpg.interfaces import Environment
 from hcpg.loops.memory import hand_back
-from hcpg.types import Bool, Float, Int, UInt8
+from hcpg.types import Bool, Float, Int, RenderingError, UInt8
 
 NOBODY = -1
 """Entry of `Board.busy` while a worker is inside none of its environments."""
@@ -173,8 +173,9 @@ class Station:
 def serve(connection: Connection, post: Post) -> None:
     """Answer the parent's commands until it hangs up; the body of a worker process.
 
-    A command is `(method of the station, arguments)`; an answer is `(None, result)`, or `(traceback, None)`
-    when the simulator raised an error: `Board.busy` then names the environment, and the worker ends.
+    A command is `(method of the station, arguments)`; an answer is `(None, result)`, or `(failure, None)`
+    when the simulator raised an error: `Board.busy` then names the environment, and the worker ends. A
+    failure is a traceback, or the error itself where the machine is to blame and no line of code is.
     """
     threading.Thread(target=_leave_with_parent, daemon=True).start()
     memory = SharedMemory(post.memory)
@@ -201,9 +202,11 @@ def _answer_commands(connection: Connection, post: Post, board: Board) -> None:
             station.close()
 
 
-def _attempt(call: Callable[..., Any], *arguments: Any) -> tuple[str | None, Any]:
+def _attempt(call: Callable[..., Any], *arguments: Any) -> tuple[str | RenderingError | None, Any]:
     try:
         return None, call(*arguments)
+    except RenderingError as error:
+        return error, None
     except Exception:  # whatever a simulator raises is the parent's to report
         return traceback.format_exc(), None
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hcpg.interfaces import Environment, Task
-from hcpg.types import Float, Spec, Step, UInt8
+from hcpg.types import Float, RenderingError, Spec, Step, UInt8
 
 OBSERVATION_SIZE, ACTION_SIZE = 39, 4
 START_STATES = 50
@@ -50,17 +50,6 @@ CAMERA = {"lookat": (0.0, 0.68, 0.15), "distance": 1.5, "azimuth": 140.0, "eleva
 OPENGL_LIBRARIES = {"egl": "libEGL.so.1", "osmesa": "libOSMesa.so.8"}
 """What each value of MUJOCO_GL that needs no display loads."""
 OPENGL_PACKAGES = "libegl1 libgl1-mesa-dri"
-
-
-class RenderingError(RuntimeError):
-    """No picture can be drawn on this machine; the message names what to install."""
-
-    def __init__(self, backend: str, cause: object) -> None:
-        super().__init__(
-            f"cannot draw with OpenGL (MUJOCO_GL={backend}): {cause}. Debian, Ubuntu: run "
-            f"scripts/install_system_packages.sh, or: sudo apt-get install {OPENGL_PACKAGES}; "
-            "then draw with MUJOCO_GL=egl, the default. Training needs no OpenGL."
-        )
 
 
 class MetaworldEnvironment:
@@ -162,7 +151,7 @@ def _require_opengl_library(backend: str) -> None:
         try:
             ctypes.CDLL(OPENGL_LIBRARIES[backend])
         except OSError as error:
-            raise RenderingError(backend, error) from error
+            raise _cannot_draw(backend, error) from error
 
 
 def _open_viewer(model: Any, data: Any) -> Any:
@@ -177,10 +166,18 @@ def _open_viewer(model: Any, data: Any) -> Any:
     try:
         viewer = OffScreenViewer(model, data, PICTURE_PIXELS, PICTURE_PIXELS)
     except (AttributeError, ImportError, RuntimeError, mujoco.FatalError) as error:
-        raise RenderingError(backend, error) from error
+        raise _cannot_draw(backend, error) from error
     # Shadows cost more than half of a picture that the processor draws.
     viewer.scn.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
     viewer.cam.lookat[:] = CAMERA["lookat"]
     for angle_or_length in ("distance", "azimuth", "elevation"):
         setattr(viewer.cam, angle_or_length, CAMERA[angle_or_length])
     return viewer
+
+
+def _cannot_draw(backend: str, cause: object) -> RenderingError:
+    return RenderingError(
+        f"cannot draw with OpenGL (MUJOCO_GL={backend}): {cause}. Debian, Ubuntu: run "
+        f"scripts/install_system_packages.sh, or: sudo apt-get install {OPENGL_PACKAGES}; "
+        "then draw with MUJOCO_GL=egl, the default. Training needs no OpenGL."
+    )

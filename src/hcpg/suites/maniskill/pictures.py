@@ -5,18 +5,12 @@ from typing import Any
 import numpy as np
 
 from hcpg.suites.maniskill.building import build_stage
-from hcpg.types import UInt8
+from hcpg.types import RenderingError, UInt8
 
-
-class RenderingError(RuntimeError):
-    """No picture can be drawn on this machine; the message names what to install."""
-
-    def __init__(self, cause: object) -> None:
-        super().__init__(
-            f"cannot draw with Vulkan: {cause}. Without a GPU it takes Mesa 24 or newer: run "
-            "scripts/install_system_packages.sh vulkan (Debian, Ubuntu); `hcpg doctor` says what is there. "
-            "Training needs no Vulkan."
-        )
+CURE = (
+    "Without a GPU it takes Mesa 24 or newer: run scripts/install_system_packages.sh vulkan "
+    "(Debian, Ubuntu); `hcpg doctor` says what is there. Training needs no Vulkan."
+)
 
 
 class Camera:
@@ -31,7 +25,7 @@ class Camera:
         try:
             self._stage = build_stage(env_id, control_mode)
         except RuntimeError as error:
-            raise RenderingError(error) from error
+            raise RenderingError(f"cannot draw with Vulkan: {error}. {CURE}") from error
 
     def picture(self, simulation: Any) -> UInt8[np.ndarray, "H W 3"]:
         """What ManiSkill's own camera for videos sees of the simulation's state."""
