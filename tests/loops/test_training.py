@@ -61,7 +61,10 @@ def test_a_run_in_a_population_gives_the_numbers_it_gives_alone(tmp_path):
     assert scales <= learned[0].keys()
     assert max(np.abs(learned[1][name] - learned[0][name]).max() for name in learned[0]) > 0.1
     for own, beside in zip(alone.rows("episodes"), population[1].rows("episodes"), strict=True):
-        assert beside == own | {"return": pytest.approx(own["return"], rel=1e-4)}
+        near = {name: pytest.approx(own[name], rel=1e-4) for name in own if name.endswith("return")}
+        if "value" in own:  # parameters differ by up to 1e-5, and it sums the effects of all
+            near["value"] = pytest.approx(own["value"], abs=1e-4)
+        assert beside == own | near
 
 
 def test_a_run_whose_reward_is_not_finite_stops_alone(straight, tmp_path, monkeypatch):

@@ -47,6 +47,16 @@ def test_lines_in_another_form_say_the_same(file):
         np.testing.assert_array_equal(ours, theirs)
 
 
+@pytest.mark.parametrize("value", [None, -3.5e-05, 12.0])
+def test_lines_that_say_what_the_critic_expected_are_read_the_fast_way(tmp_path, episode_rows, value):
+    path = tmp_path / "episodes.jsonl"
+    append_rows(
+        path, [{**row, "value": value, "discounted_return": 0.25} for row in episode_rows(9, "hcpg", 2, 3)]
+    )
+    assert min(episodes._cut(path.read_bytes()).heads) >= 0
+    assert read_evaluations(path).by_selector["hcpg"].successes.tolist() == [True, True, False]
+
+
 @pytest.mark.parametrize("path", sorted(EVIDENCE.glob("drawer_open/runs/*/s0/episodes.jsonl.gz")))
 def test_the_loops_write_what_is_read_the_fast_way(path):
     """Line for line, and with the same result as the JSON parser's."""

@@ -96,6 +96,17 @@ def compiled(policy: Callable[..., Any], state_type: type, runs: int) -> Callabl
 
 
 @once
+def appraised(method: Valued, state_type: type, runs: int) -> Callable[..., Float[Array, "R E"]]:
+    """The pessimistic critic's values for R runs: (states, observations [R, E, O], actions [R, E, A])."""
+
+    def one(state: Any, observation: Array, action: Array) -> Array:
+        return method.value(state, observation, action[None])[0]
+
+    every = jax.vmap(one, in_axes=(None, 0, 0))
+    return jax.jit(over_runs(every, runs, (axes_of(state_type), 0, 0)))
+
+
+@once
 def warmup(runs: int, environments: int, action_size: int) -> Callable[..., Chosen]:
     """Uniform actions in [-1, 1] that bypass the selector: (keys [R], tick) -> Chosen."""
 

@@ -10,7 +10,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from hcpg.interfaces import Method, ReadScene
+from hcpg.interfaces import Method, ReadScene, Valued
 from hcpg.loops import acting
 from hcpg.loops.batch_pool import open_pool
 from hcpg.loops.episodes import Episodes
@@ -28,7 +28,7 @@ class Evaluator:
 
     def __init__(self, settings: Settings, method: Method, read_scene: ReadScene, seeds: list[int]) -> None:
         self.episodes = settings.budget.evaluation_episodes
-        self._settings, self._seeds = settings, seeds
+        self._settings, self._method, self._seeds = settings, method, seeds
         selector = settings.evaluation_selector
         guided = {} if selector.alone else {selector.rule: acting.guided(method, selector, read_scene)}
         self._policies = guided | {BARE: acting.bare(method)}
@@ -43,7 +43,12 @@ class Evaluator:
     def evaluate(
         self, states: Any, step: int, workers: int, names: Iterable[str] | None = None
     ) -> list[list[dict[str, Any]]]:
-        """For each run, a row per episode: all with the selector, then all bare (or only `names`)."""
+        """For each run, a row per episode: all with the selector, then all bare (or only `names`).
+
+        A row has what the critic expected of the episode's first action (`value`; null without a critic) and
+        what came of it (`discounted_return`, without any bonus for entropy): their difference tells how far
+        the critic overestimates.
+        """
         if self._pool is None:
             seeds = [EVALUATION_SEED] * (self._slots * len(self._seeds))
             self._pool = open_pool(self._settings.task, seeds, workers=workers)
@@ -71,18 +76,31 @@ class Evaluator:
         observations, episodes = pool.reset(every), Episodes.begin(every)
         keys, lucks = self._keys(step, int(starts[0]))
         records: dict[int, dict[str, Any]] = {}
+        values, discounted = np.empty(0), np.zeros(pool.size)
         tick = 0
         while len(records) < pool.size:
             shaped = observations.reshape(runs, self._slots, -1)
-            actions = np.asarray(policy(states, shaped, keys, lucks, tick).actions)
-            pool.send(np.nan_to_num(actions.reshape(pool.size, -1)), every)
+            actions = np.nan_to_num(np.asarray(policy(states, shaped, keys, lucks, tick).actions))
+            pool.send(actions.reshape(pool.size, -1), every)
+            if tick == 0:
+                values = self._values(states, shaped, actions)
             arrival = pool.receive()
+            discounted += self._settings.learner.discount**tick * arrival.rewards
             episodes, ended = episodes.advance(arrival, every)
             for record in ended:
-                records.setdefault(record["environment"], record)
+                place = record["environment"]
+                worth = {"value": float(values[place]), "discounted_return": float(discounted[place])}
+                records.setdefault(place, record | worth)
             observations, tick = arrival.observations, tick + 1
         wanted = [range(run * self._slots, run * self._slots + len(starts)) for run in range(runs)]
         return [[records[i] | {"environment": i - indices[0]} for i in indices] for indices in wanted]
+
+    def _values(self, states: Any, observations: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """What the critic expects of each episode's first action, [R * slots]; NaN without a critic."""
+        if not isinstance(self._method, Valued):
+            return np.full(actions.shape[0] * actions.shape[1], np.nan)
+        appraise = acting.appraised(self._method, type(states), len(self._seeds))
+        return np.asarray(appraise(states, observations, actions)).reshape(-1)
 
     def _policy(self, name: str, states: Any) -> Callable[..., acting.Chosen]:
         if name not in self._compiled:

@@ -26,7 +26,8 @@ _HEAD = re.compile(
 _TAIL = re.compile(
     rb'"start": (' + _INTEGER + rb'), "success_once": (true|false), "success_at_end": (?:true|false), '
     rb'"steps_to_success": ' + _INTEGER + rb', "return": (?:' + _NUMBER + rb'|null), "length": '
-    rb"" + _INTEGER + rb"\}\n"
+    rb"" + _INTEGER + rb'(?:, "value": (?:' + _NUMBER + rb'|null), "discounted_return": (?:' + _NUMBER + rb""
+    rb"|null))?+\}\n"
 )
 _EVALUATION = (
     '{{"step": {step}, "phase": "evaluation", "selector": "{selector}", "adapter": "{adapter}", '
