@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from hcpg.report.records import find_runs, load_run
-from hcpg.report.stability import write_all
+from hcpg.report.stability import page
 
 
 def main() -> None:
@@ -18,7 +18,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("runs", type=Path, nargs="+")
     found = [load_run(path) for root in parser.parse_args().runs for path in find_runs(root)]
-    sys.stdout.write(write_all([run for run in found if run.curves]))
+    sys.stdout.write(page([run for run in found if run.curves]))
 
 
 if __name__ == "__main__":

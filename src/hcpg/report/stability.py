@@ -70,6 +70,11 @@ def table(run: Record) -> str:
     return aligned(lines)
 
 
+def page(runs: Sequence[Record]) -> str:
+    """Every run's table under its name and the folder it lies in."""
+    return "\n\n".join(f"### {run.name} ({run.path.name})\n\n{table(run)}" for run in runs) + "\n"
+
+
 def _last(logged: Sequence[Row], step: int) -> Row:
     return next((row for row in reversed(logged) if row["step"] <= step), {})
 
@@ -86,8 +91,3 @@ def _rate(episodes: Sequence[Row], selector: str) -> str:
 
 def _number(value: float | None) -> str:
     return _ABSENT if value is None or math.isnan(value) else f"{value:.3g}"
-
-
-def write_all(runs: Sequence[Record]) -> str:
-    """Every run's table under its name and the folder it lies in."""
-    return "\n\n".join(f"### {run.name} ({run.path.name})\n\n{table(run)}" for run in runs) + "\n"
