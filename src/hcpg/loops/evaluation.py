@@ -17,6 +17,7 @@ from hcpg.loops.episodes import Episodes
 from hcpg.loops.pool import Pool
 from hcpg.loops.streams import EVALUATION_SEED, Stream, key
 from hcpg.presets import Settings
+from hcpg.types import Tensor
 
 BARE = "bare"
 SIMULTANEOUS_EPISODES = 10
@@ -95,7 +96,7 @@ class Evaluator:
         wanted = [range(run * self._slots, run * self._slots + len(starts)) for run in range(runs)]
         return [[records[i] | {"environment": i - indices[0]} for i in indices] for indices in wanted]
 
-    def _values(self, states: Any, observations: np.ndarray, actions: np.ndarray) -> np.ndarray:
+    def _values(self, states: Any, observations: Tensor, actions: np.ndarray) -> np.ndarray:
         """What the critic expects of each episode's first action, [R * slots]; NaN without a critic."""
         if not isinstance(self._method, Valued):
             return np.full(actions.shape[0] * actions.shape[1], np.nan)
