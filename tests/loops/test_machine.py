@@ -11,12 +11,14 @@ from hcpg.loops.child import Job
 from hcpg.loops.population import spread
 
 
-def test_a_run_on_one_core_keeps_what_the_user_has_set():
-    variables = machine.one_core({"XLA_FLAGS": "--xla_dump_to=/tmp/x", "OMP_NUM_THREADS": "3"})
+def test_a_run_on_one_core_keeps_what_the_user_has_set(monkeypatch):
+    monkeypatch.setattr(machine, "cores", lambda: 8)
+    variables = machine.one_core({"XLA_FLAGS": "--xla_dump_to=/tmp/x", "OMP_NUM_THREADS": "3"}, 3)
     assert variables == {
         "OPENBLAS_NUM_THREADS": "1",
         "OMP_NUM_THREADS": "3",
         "MKL_NUM_THREADS": "1",
+        "PJRT_NPROC": "2",
         "XLA_FLAGS": f"{machine.ONE_THREAD_XLA} --xla_dump_to=/tmp/x",
     }
     assert machine.one_core(variables) == variables
@@ -38,7 +40,7 @@ def test_processes_on_one_gpu_share_its_memory():
 @pytest.mark.parametrize(("cores", "processes", "workers"), [(2, 3, 1), (2, 2, 1), (8, 3, 2), (8, 1, 8)])
 def test_cores_are_shared_among_the_runs(monkeypatch, cores, processes, workers):
     monkeypatch.setattr(machine, "cores", lambda: cores)
-    assert machine.workers_per_run(processes) == workers
+    assert machine.cores_each(processes) == workers
 
 
 def test_a_cpu_gets_a_process_per_run_and_an_accelerator_one_per_job(tmp_path):
@@ -62,7 +64,21 @@ def test_with_a_plugin_jax_itself_is_asked(monkeypatch):
     assert not machine.has_accelerator({})
 
 
-def test_processes_keep_to_a_core_each_where_there_are_not_more_cores(monkeypatch):
+def test_xla_starts_no_more_threads_than_its_share():
+    """XLA names its workers `tf_XLAEigen`; the variable must be the one that this JAX reads."""
+    count = (
+        "import jax; jax.jit(lambda x: x + 1)(1.0).block_until_ready();"
+        "from pathlib import Path; names = [p.read_text() for p in Path('/proc/self/task').glob('*/comm')];"
+        "print(sum('XLAEigen' in name for name in names))"
+    )
+    for share in ("1", "3"):
+        variables = {**os.environ, **machine.one_core({"PJRT_NPROC": share}), "JAX_PLATFORMS": "cpu"}
+        asked = subprocess.run([sys.executable, "-c", count], env=variables, capture_output=True, text=True)
+        assert asked.stdout.strip() == share, asked.stderr
+
+
+def test_processes_keep_to_a_core_where_each_has_one_to_itself(monkeypatch):
     monkeypatch.setattr(machine.os, "sched_getaffinity", lambda _: {5, 3})
+    assert [machine.core_for(index, 2) for index in range(2)] == [{3}, {5}]
     assert machine.core_for(0, 1) is None
-    assert [machine.core_for(index, 3) for index in range(3)] == [{3}, {5}, {3}]
+    assert [machine.core_for(index, 3) for index in range(3)] == [None, None, None]

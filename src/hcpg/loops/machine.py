@@ -12,6 +12,7 @@ from importlib.metadata import entry_points
 from importlib.util import find_spec
 
 ONE_THREAD_XLA = "--xla_cpu_multi_thread_eigen=false"
+_XLA_THREADS = "PJRT_NPROC"
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _BACKEND_PROBE = "import jax; print(jax.default_backend())"
 _GPU_SHARE = 0.75
@@ -22,19 +23,22 @@ def cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def workers_per_run(processes: int) -> int:
-    """Environment workers of each process; what is computed does not depend on it."""
+def cores_each(processes: int) -> int:
+    """Each process's share of the cores, at least one: so many environment workers and threads of XLA.
+
+    What is computed does not depend on it.
+    """
     return max(1, cores() // processes)
 
 
 def core_for(index: int, processes: int) -> set[int] | None:
-    """The core that process `index` of so many shall keep to; None where there are more cores than processes.
+    """The core that process `index` of so many shall keep to, where each has one to itself; otherwise None.
 
-    Left to the scheduler, three learners on two cores took 3.5 times the time of one, kept to a core each 2.9
-    (docs/evidence/speed).
+    More processes than cores are the scheduler's to lay out: kept to cores, those that share one go on
+    sharing it when the others have ended (docs/evidence/speed).
     """
     allowed = sorted(os.sched_getaffinity(0))
-    return None if processes < len(allowed) else {allowed[index % len(allowed)]}
+    return {allowed[index]} if processes == len(allowed) else None
 
 
 def has_accelerator(environment: Mapping[str, str] = os.environ) -> bool:
@@ -51,11 +55,17 @@ def has_accelerator(environment: Mapping[str, str] = os.environ) -> bool:
     return asked.stdout.split()[-1] != "cpu"
 
 
-def one_core(environment: Mapping[str, str]) -> dict[str, str]:
-    """The variables for a process that computes on one core; what the user has set wins."""
+def one_core(environment: Mapping[str, str], processes: int = 1) -> dict[str, str]:
+    """The variables for one of several processes that each compute on one core; what the user has set wins.
+
+    XLA starts a thread for each core that it may use, and they wait for each other within one update. Three
+    processes on two cores would have six; kept to their share, they take a fifth less time
+    (docs/evidence/speed).
+    """
     given = environment.get("XLA_FLAGS", "")
     flags = given if ONE_THREAD_XLA in given else f"{ONE_THREAD_XLA} {given}".strip()
-    return {**{name: environment.get(name, "1") for name in _THREADS}, "XLA_FLAGS": flags}
+    share = {_XLA_THREADS: environment.get(_XLA_THREADS, str(cores_each(processes)))}
+    return {**{name: environment.get(name, "1") for name in _THREADS}, **share, "XLA_FLAGS": flags}
 
 
 def gpu_share(environment: Mapping[str, str], processes: int) -> dict[str, str]:

@@ -120,10 +120,10 @@ class _Child:
         context = multiprocessing.get_context("spawn")
         here, there = context.Pipe()
         self.pipe: Connection | None = here
-        arguments = (job, machine.workers_per_run(processes), self._log, there)
+        arguments = (job, machine.cores_each(processes), self._log, there)
         self.process: BaseProcess = context.Process(target=work, args=arguments)
-        variables = machine.gpu_share(os.environ, processes) if accelerated else machine.one_core(os.environ)
-        with deaf_start(variables):
+        share = machine.gpu_share if accelerated else machine.one_core
+        with deaf_start(share(os.environ, processes)):
             self.process.start()
         core = None if accelerated else machine.core_for(index, processes)
         if core is not None and self.process.pid is not None:
