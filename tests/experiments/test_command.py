@@ -93,6 +93,27 @@ def test_a_complete_experiment_is_reported_and_other_seeds_can_be_asked_for(
     assert (len(stand_in.jobs), len(stand_in.asked)) == (4, 1)
 
 
+def test_a_part_can_be_run_and_only_the_whole_is_reported(small, stand_in, tmp_path, capsys):
+    words = ["experiment", "run", "small", "--out", str(tmp_path), "--tasks", "point/reach"]
+    assert cli.main([*words, "--presets", "qsm"]) == 0
+    assert [job.unit.cells[0].settings.preset for job in stand_in.jobs] == ["qsm", "qsm"]
+    assert stand_in.asked == []
+    capsys.readouterr()
+    assert cli.main(["experiment", "status", *words[2:], "--presets", "qsm"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "2 finished"
+    stand_in.most = 1  # the first run closed it
+    assert cli.main(words) == 0
+    assert (len(stand_in.jobs), stand_in.asked) == (4, [[str(tmp_path / "small")]])
+
+
+def test_a_preset_that_the_table_lacks_is_refused_with_those_it_has(small, stand_in, tmp_path, capsys):
+    words = ["experiment", "run", "small", "--out", str(tmp_path), "--presets", "sac_flow"]
+    assert cli.main(words) == 2
+    message = "no preset of this experiment is named 'sac_flow'. Known: sac, qsm."
+    assert message in capsys.readouterr().err
+    assert stand_in.jobs == []
+
+
 def test_an_experiment_with_a_failed_run_is_not_reported(small, stand_in, tmp_path, capsys):
     stand_in.codes = [1]
     assert cli.main(["experiment", "run", "small", "--out", str(tmp_path)]) == 1

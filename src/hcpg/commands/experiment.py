@@ -38,12 +38,13 @@ def run(arguments: Sequence[str]) -> int:
     if options.cores_per_job < 1:
         parser.error(f"--cores-per-job {options.cores_per_job}: a job needs at least one")
     options.cores = cores[: options.cores]
-    chosen = protocol(options.name)
+    whole = protocol(options.name)
     if options.seeds:
-        chosen = replace(chosen, seeds=tuple(dict.fromkeys(options.seeds)))
+        whole = replace(whole, seeds=tuple(dict.fromkeys(options.seeds)))
+    part = whole.only(options.tasks, options.presets)
     if options.action == "status":
-        return _status(ledger.entries(chosen.cells(), options.out / options.name), len(options.cores))
-    return _run(options, chosen)
+        return _status(ledger.entries(part.cells(), options.out / options.name), len(options.cores))
+    return _run(options, part, whole)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -53,6 +54,8 @@ def _parser() -> argparse.ArgumentParser:
     add("name", nargs="?", metavar="NAME", help="`hcpg experiment list` shows all")
     add("--out", type=Path, default=Path("results"), help="default: results")
     add("--seeds", type=int, nargs="+", help="others than the experiment's own, to settle what is undecided")
+    add("--tasks", nargs="+", default=[], metavar="TASK", help="only these of the experiment's")
+    add("--presets", nargs="+", default=[], metavar="PRESET", help="only these of the experiment's")
     add("--cores", type=int, help="cores of this machine to use, one run on each; default: all")
     add(
         "--gpus-per-job",
@@ -66,10 +69,10 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _run(options: argparse.Namespace, chosen: Protocol) -> int:
-    for settings in chosen.settings():
+def _run(options: argparse.Namespace, part: Protocol, whole: Protocol) -> int:
+    for settings in part.settings():
         check(settings)
-    cells, results = chosen.cells(), options.out / options.name
+    cells, results = part.cells(), options.out / options.name
     taken = adopt(cells, results, [options.out / name for name in PROTOCOLS if name != options.name])
     if taken:
         _say(f"{len(taken)} runs are taken over from other experiments in {options.out}")
@@ -77,11 +80,11 @@ def _run(options: argparse.Namespace, chosen: Protocol) -> int:
         ended = engine.run(cells, results, place, _say)
     if ended.signal is not None:
         return BY_SIGNAL + ended.signal
-    entries = ledger.entries(cells, results)
-    _status(entries, len(options.cores))
+    _status(ledger.entries(cells, results), len(options.cores))
     if ended.failed:
         return 1
-    if options.no_report or any(entry.state not in ledger.DONE for entry in entries):
+    everything = ledger.entries(whole.cells(), results)
+    if options.no_report or any(entry.state not in ledger.DONE for entry in everything):
         return 0
     return report.run([str(results)])
 

@@ -1,7 +1,7 @@
 """Which runs make up a table: tasks, presets, seeds and a budget, chosen before anything is trained."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -61,6 +61,22 @@ class Protocol:
     def cells(self) -> list[Cell]:
         """All runs, seed by seed: what is there after an interruption covers the whole table."""
         return [Cell(each, seed) for seed in self.seeds for each in self.settings()]
+
+    def only(self, tasks: Sequence[str], presets: Sequence[str]) -> "Protocol":
+        """The part with these tasks and presets, in the table's order; with all where none is named.
+
+        Raises:
+            UnknownNameError: the table has no such task or preset.
+        """
+        for kind, asked, known in (("task", tasks, self.tasks), ("preset", presets, self.presets)):
+            for name in asked:
+                if name not in known:
+                    raise registry.UnknownNameError(f"{kind} of this experiment", name, list(known))
+        return replace(
+            self,
+            tasks=tuple(each for each in self.tasks if not tasks or each in tasks),
+            presets=tuple(each for each in self.presets if not presets or each in presets),
+        )
 
     def _settings(self, task: str, preset: str) -> Settings:
         usual = presets.settings(task, preset, self.budget)
