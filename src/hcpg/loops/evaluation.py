@@ -21,7 +21,7 @@ from hcpg.types import Tensor
 
 BARE = "bare"
 SIMULTANEOUS_EPISODES = 10
-"""Per run; more at once would save little time and cost memory (20 MB a simulator)."""
+"""Per run. Random numbers are drawn for all of them at once: another number would bring other episodes."""
 
 
 class Evaluator:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from hcpg.interfaces import Environment, Task
+from hcpg.suites.metaworld.shared_model import on_shared_model
 from hcpg.types import Float, RenderingError, Spec, Step, UInt8
 
 OBSERVATION_SIZE, ACTION_SIZE = 39, 4
@@ -53,17 +54,24 @@ OPENGL_PACKAGES = "libegl1 libgl1-mesa-dri"
 
 
 class MetaworldEnvironment:
-    """One Meta-World task with the goal visible and reward v2, 0 to 10 per step."""
+    """One Meta-World task with the goal visible and reward v2, 0 to 10 per step.
+
+    All of a task in a process share one model: step them from one thread.
+    """
 
     def __init__(self, env_id: str, seed: int) -> None:
         self._starts = _start_states(env_id, seed)
         self._simulation = _simulation_class(env_id)()
+        self._places = self._simulation.shared.places()
         self._viewer: Any = None
 
     def reset(self, start: int) -> Float[np.ndarray, " O"]:
         """The first observation of start state `start % 50`, bit for bit the same every time."""
+        shared = self._simulation.shared
+        shared.put(self._places)
         self._simulation.set_task(self._starts[start % START_STATES])
         observation, _ = self._simulation.reset()
+        self._places = shared.places()
         return observation.astype(np.float32)
 
     def step(self, action: Float[np.ndarray, " A"]) -> Step:
@@ -74,6 +82,7 @@ class MetaworldEnvironment:
         """
         if action.shape != (ACTION_SIZE,) or not math.isfinite(action.sum()):
             raise ValueError(f"an action of metaworld is four finite numbers in [-1, 1], got {action}")
+        self._simulation.shared.put(self._places)
         observation, reward, _, _, info = self._simulation.step(action)
         return Step(observation.astype(np.float32), float(reward), False, bool(info["success"]))
 
@@ -87,6 +96,7 @@ class MetaworldEnvironment:
             self._viewer = _open_viewer(self._simulation.model, self._simulation.data)
             # Left to the interpreter's end, a viewer outlives the library that it frees itself with.
             atexit.register(self.close)
+        self._simulation.shared.put(self._places)
         self._viewer.make_context_current()
         return np.ascontiguousarray(self._viewer.render("rgb_array", camera_id=-1))
 
@@ -140,10 +150,8 @@ def _start_states(env_id: str, seed: int) -> list[Any]:
 
 
 def _simulation_class(env_id: str) -> Any:
-    stock = _metaworld().ALL_V3_ENVIRONMENTS[env_id]
-    if env_id not in SCANS_CONTACTS_FOR_INFO_ONLY:
-        return stock
-    return type(stock.__name__, (stock,), {"touching_main_object": False})
+    unread = {"touching_main_object": False} if env_id in SCANS_CONTACTS_FOR_INFO_ONLY else {}
+    return on_shared_model(_metaworld().ALL_V3_ENVIRONMENTS[env_id], **unread)
 
 
 def _require_opengl_library(backend: str) -> None:
