@@ -22,6 +22,8 @@ from hcpg.presets import Settings
 from hcpg.selection.arrays import namespace
 from hcpg.types import Batch, Tensor
 
+MEMORY_RETURNS_S = 10.0
+"""How soon what compiling has left is handed back."""
 _STACK, _INSERT = jax.jit(stack), jax.jit(replay.insert, donate_argnums=0)
 
 
@@ -111,6 +113,7 @@ class Trainer:
         loses nothing that was learned.
         """
         began = time.monotonic() - position.wall_s
+        returns = memory.Returns(MEMORY_RETURNS_S)
         self.journal.begin(self.step(position))
         try:
             self._evaluate(position, save)  # due here if the last sitting failed while it evaluated
@@ -121,7 +124,7 @@ class Trainer:
                 if self.schedule.logs(position.tick):
                     updates = int(position.states.updates)
                     self.journal.row(self.step(position), updates, position.wall_s)
-                    memory.hand_back()
+                    returns.hand_back()
                 self._evaluate(position, save)
         finally:
             self.evaluator.close()
