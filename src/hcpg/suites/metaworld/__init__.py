@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hcpg.interfaces import Environment, Task
-from hcpg.suites.metaworld.shared_model import on_shared_model
+from hcpg.suites.metaworld.stepping import simulation_class
 from hcpg.types import Float, RenderingError, Spec, Step, UInt8
 
 OBSERVATION_SIZE, ACTION_SIZE = 39, 4
@@ -151,7 +151,7 @@ def _start_states(env_id: str, seed: int) -> list[Any]:
 
 def _simulation_class(env_id: str) -> Any:
     unread = {"touching_main_object": False} if env_id in SCANS_CONTACTS_FOR_INFO_ONLY else {}
-    return on_shared_model(_metaworld().ALL_V3_ENVIRONMENTS[env_id], **unread)
+    return simulation_class(_metaworld().ALL_V3_ENVIRONMENTS[env_id], **unread)
 
 
 def _require_opengl_library(backend: str) -> None:

@@ -4,7 +4,6 @@ A compiled model of Meta-World takes 20 MB and a quarter of a second. Of its arr
 when an episode begins: the places of bodies and of sites. All others are every environment's.
 """
 
-from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 from weakref import WeakValueDictionary
@@ -43,16 +42,11 @@ _in_use: WeakValueDictionary[str, SharedModel] = WeakValueDictionary()
 """By file; the last environment that uses a model takes it along."""
 
 
-def on_shared_model(stock: type, **attributes: Any) -> Callable[[], Any]:
-    """A class of the package, some attributes replaced, whose simulations share their model: `shared`."""
-
-    def initialize(simulation: Any) -> tuple[Any, Any]:
-        path = simulation.fullpath
-        if path in _in_use:
-            simulation.shared = _in_use[path]
-            return simulation.shared.model, simulation.shared.new_data()
-        model, data = stock._initialize_simulation(simulation)  # type: ignore[attr-defined]
-        simulation.shared = _in_use[path] = SharedModel(model)
-        return model, data
-
-    return type(stock.__name__, (stock,), {"_initialize_simulation": initialize, **attributes})
+def simulated(stock: type, simulation: Any) -> tuple[SharedModel, Any]:
+    """The model of a simulation of the package's class `stock`, and data of its own."""
+    path = simulation.fullpath
+    if path in _in_use:
+        return _in_use[path], _in_use[path].new_data()
+    model, data = stock._initialize_simulation(simulation)  # type: ignore[attr-defined]
+    shared = _in_use[path] = SharedModel(model)
+    return shared, data
