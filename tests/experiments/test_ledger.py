@@ -71,6 +71,14 @@ def test_a_claimed_cell_is_running_even_before_it_has_a_folder_and_a_finished_on
     assert states([cell(0)], tmp_path) == ["left"]
 
 
+def test_the_time_a_run_was_suspended_is_not_an_entrys(tmp_path):
+    folder = make(tmp_path, cell(0), "stopped")
+    rows = [{"step": step, "wall_s": step / 4 + 3600.0 * (step > 16)} for step in range(4, 33, 4)]
+    folder.append("metrics", rows)
+    [entry] = entries([cell(0)], tmp_path)
+    assert (entry.step, entry.seconds) == (32, 8.0)
+
+
 def test_an_entry_tells_how_far_its_run_is(tmp_path):
     folder = make(tmp_path, cell(0), "stopped", wall_s=8.0)
     folder.append("metrics", [{"step": 32, "wall_s": 9.5}])

@@ -1,12 +1,14 @@
 """What became of an experiment's runs, read from its results folder; nothing is kept beside the runs."""
 
 import json
+from math import isnan
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 from hcpg.experiments.claims import claim_of, is_locked
 from hcpg.experiments.protocols import Cell
 from hcpg.loops.runs import RunFolder
+from hcpg.report.durations import undisturbed_s
 from hcpg.report.records import find_runs
 
 State = Literal["left", "running", "stopped", "failed", "diverged", "finished"]
@@ -23,7 +25,7 @@ class Entry(NamedTuple):
     step: int = 0
     """Environment steps of the newest row of metrics."""
     seconds: float = 0.0
-    """Training time up to there, over all sittings."""
+    """Time of training and evaluations up to there, over all sittings; less where it was suspended."""
 
 
 def entries(cells: list[Cell], results: Path) -> list[Entry]:
@@ -62,11 +64,12 @@ def _entry(cell: Cell, path: Path | None) -> Entry:
     if state == "running" and not folder.in_use():
         state = "stopped"  # its process died without a word
     rows = folder.rows("metrics")
-    return (
-        Entry(cell, state, path, rows[-1]["step"], float(rows[-1]["wall_s"]))
-        if rows
-        else Entry(cell, state, path)
-    )
+    if not rows:
+        return Entry(cell, state, path)
+    budget, step = cell.settings.budget, rows[-1]["step"]
+    each = budget.steps / budget.evaluations
+    seconds = undisturbed_s(rows, [each * (past + 1) for past in range(int(step // each))])
+    return Entry(cell, state, path, step, rows[-1]["wall_s"] if isnan(seconds) else seconds)
 
 
 def _at_work(entry: Entry) -> Entry:

@@ -116,12 +116,8 @@ def _spread(mean: float, deviation: float) -> str:
 
 
 def _costs(groups: Sequence[Group]) -> str:
-    """From each run's median rate of steps: the wall time of a run that was suspended is no cost."""
-    hours = sum(_hours(group) for group in groups)
-    runs = sum(len(group.runs) for group in groups)
-    how = "steps over the median of steps per second, one core a run"
-    return f"These {runs} runs cost about {hours:.1f} core-hours: {how}."
-
-
-def _hours(group: Group) -> float:
-    return sum(group.runs[0].config["budget"]["steps"] / run.steps_per_s / 3600 for run in group.runs)
+    """The wall time of a run that was suspended is no cost."""
+    runs = [run for group in groups for run in group.runs]
+    hours = sum(run.undisturbed_s for run in runs) / 3600
+    how = "steps and evaluations, each at the median of the time it took, one core a run"
+    return f"These {len(runs)} runs cost about {hours:.1f} core-hours: {how}."

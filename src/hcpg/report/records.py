@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hcpg.report.durations import undisturbed_s
 from hcpg.report.episodes import Episodes
 from hcpg.report.measured import BARE, Curve, Measured, RecordError, measure
 from hcpg.report.reading import measured_runs
@@ -58,6 +59,16 @@ class Record(NamedTuple):
         rows = read_rows(self.path / "metrics.jsonl")
         speeds = [row["steps_per_s"] for row in rows if row["steps_per_s"] is not None]
         return float(np.median(speeds)) if speeds else float("nan")
+
+    @property
+    def undisturbed_s(self) -> float:
+        """Time that the run takes where nothing suspends it, evaluations included; NaN without metrics.
+
+        Raises:
+            RowError: a line of the metrics is damaged.
+        """
+        evaluated = {step for curve in self.curves.values() for step in curve.steps.tolist()}
+        return undisturbed_s(read_rows(self.path / "metrics.jsonl"), evaluated)
 
 
 class Group(NamedTuple):
