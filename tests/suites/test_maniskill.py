@@ -151,6 +151,28 @@ def test_episodes_repeat_bit_for_bit_whatever_was_touched_before(make, name):
     fresh.close()
 
 
+def test_a_cube_that_was_hit_stays_awake_no_longer_in_the_next_episode():
+    """PhysX keeps a body awake for longer the harder it was hit, and the body takes that along."""
+
+    def push(environment, start, read, within_m, steps):
+        observation, rows = environment.reset(start), []
+        for _ in range(steps):
+            scene = read(observation)
+            vector = scene.task if (scene.contact or 0.0) > 0.5 else scene.approach
+            action = np.append(np.clip(vector / within_m, -1, 1), CLOSE).astype(np.float32)
+            observation = environment.step(action).observation
+            rows.append(observation)
+        return np.asarray(rows)
+
+    adapters = TASKS["push-cube"].adapters
+    used, fresh = (suite.SUITE.make(TASKS["push-cube"], seed=0) for _ in range(2))
+    push(used, 112, adapters["paper"], 0.05, 12)
+    rows = [push(each, 0, adapters["contact"], 0.1, 30) for each in (used, fresh)]
+    assert np.array_equal(*rows)
+    for each in (used, fresh):
+        each.close()
+
+
 def test_the_packages_own_reset_leaves_contacts_that_change_the_next_episode(make):
     environment = make("push-cube")
     read, stepping = push_cube.read_contact_scene, environment._stepping
