@@ -1,4 +1,4 @@
-"""A step of Meta-World 3.1.1 with the same numbers in two thirds of the time.
+"""A step of Meta-World 3.1.1 with the same numbers in three quarters of the time.
 
 Physics, rewards and what a task says of its objects stay the package's. What changes is how a command gets
 into MuJoCo and an observation out of it: bodies are looked up once, and an observation is written into one
