@@ -42,11 +42,11 @@ _in_use: WeakValueDictionary[str, SharedModel] = WeakValueDictionary()
 """By file; the last environment that uses a model takes it along."""
 
 
-def simulated(stock: type, simulation: Any) -> tuple[SharedModel, Any]:
+def simulated(stock: Any, simulation: Any) -> tuple[SharedModel, Any]:
     """The model of a simulation of the package's class `stock`, and data of its own."""
     path = simulation.fullpath
     if path in _in_use:
         return _in_use[path], _in_use[path].new_data()
-    model, data = stock._initialize_simulation(simulation)  # type: ignore[attr-defined]
+    model, data = stock._initialize_simulation(simulation)
     shared = _in_use[path] = SharedModel(model)
     return shared, data
